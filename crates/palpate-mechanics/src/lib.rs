@@ -1,0 +1,1 @@
+//! palpate-mechanics

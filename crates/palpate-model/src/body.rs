@@ -1,0 +1,225 @@
+//! The model: bodies placed in space, how the text joins them, and what acts on all of them.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use glam::{DMat3, DQuat, DVec3};
+use palpate_geometry::Point;
+
+use crate::mesh::Mesh;
+
+/// Everything a model file describes, loaded and placed.
+#[derive(Clone, Debug)]
+pub struct Model {
+    /// The bodies, in the order of their TREE blocks in the text.
+    pub bodies: Vec<Body>,
+    /// How BRANCH blocks join the bodies: the upper part of the paper's binary tree (CE and NE).
+    pub structure: Structure,
+    /// Acceleration of gravity [m/s²].
+    pub gravity: Point,
+}
+
+/// The upper binary tree: connection elements (CE) down to the bodies (NE).
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Structure {
+    /// A body, by its index in [`Model::bodies`].
+    Body(usize),
+    /// A connection element with its two subtrees; more than two children become a chain.
+    Join(Box<Structure>, Box<Structure>),
+}
+
+/// One object of the model: a mesh in its place, and how it behaves.
+#[derive(Clone, Debug)]
+pub struct Body {
+    /// Unique name: given after TREE, otherwise the mesh file's stem.
+    pub name: String,
+    /// The mesh after every ME above it and the model's unit, metres.
+    pub mesh: Arc<Mesh>,
+    /// The mesh file, as resolved; empty for a body that came from arrays.
+    pub source: PathBuf,
+    /// Where the mesh file's origin, axes and unit lengths went: `x -> linear * x + translation`.
+    pub placement: Pose,
+    /// Processor (PE) that the body is assigned to; `None` when the model leaves it to us.
+    pub processor: Option<u32>,
+    /// Material of the tissue.
+    pub material: Material,
+    /// Sorted indices of nodes held fixed.
+    pub fixed_nodes: Vec<u32>,
+    /// Motion of a rigid body; `None` for a deformable one.
+    pub rigid: Option<RigidMotion>,
+    /// Contact parameters.
+    pub contact: ContactSettings,
+    /// Colour and opacity.
+    pub appearance: Appearance,
+    /// Velocity of all nodes at the start [m/s].
+    pub initial_velocity: Point,
+}
+
+impl Body {
+    /// A deformable body with every setting at its default.
+    pub fn new(name: impl Into<String>, mesh: Arc<Mesh>) -> Self {
+        Self {
+            name: name.into(),
+            mesh,
+            source: PathBuf::new(),
+            placement: Pose::IDENTITY,
+            processor: None,
+            material: Material::default(),
+            fixed_nodes: Vec::new(),
+            rigid: None,
+            contact: ContactSettings::default(),
+            appearance: Appearance::default(),
+            initial_velocity: [0.0; 3],
+        }
+    }
+}
+
+/// An affine map `x -> linear * x + translation`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pose {
+    /// Linear part: scale, then rotation, of every ME, inner first.
+    pub linear: DMat3,
+    /// Translation [m].
+    pub translation: DVec3,
+}
+
+impl Pose {
+    /// Leaves every point where it is.
+    pub const IDENTITY: Self = Self { linear: DMat3::IDENTITY, translation: DVec3::ZERO };
+
+    /// A rotation followed by a translation [m].
+    pub fn from_rotation_translation(rotation: DQuat, translation: DVec3) -> Self {
+        Self { linear: DMat3::from_quat(rotation), translation }
+    }
+
+    /// The map that applies `inner` first, then `self`.
+    pub fn after(&self, inner: &Self) -> Self {
+        Self {
+            linear: self.linear * inner.linear,
+            translation: self.linear * inner.translation + self.translation,
+        }
+    }
+
+    /// The image of a point.
+    pub fn apply(&self, point: Point) -> Point {
+        (self.linear * DVec3::from_array(point) + self.translation).to_array()
+    }
+}
+
+/// Constitutive law of a material.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Law {
+    /// Linear elasticity in the body's own rotating frame.
+    #[default]
+    Linear,
+}
+
+/// Material of a body. The defaults are a generic soft organ.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Material {
+    /// Constitutive law.
+    pub law: Law,
+    /// Young's modulus [Pa].
+    pub young: f64,
+    /// Poisson's ratio, -1 < nu < 0.5.
+    pub poisson: f64,
+    /// Mass density [kg/m³].
+    pub density: f64,
+    /// Rayleigh damping proportional to stiffness [s].
+    pub damping: f64,
+    /// Rayleigh damping proportional to mass [1/s].
+    pub mass_damping: f64,
+}
+
+impl Default for Material {
+    fn default() -> Self {
+        Self {
+            law: Law::Linear,
+            young: 5_000.0,
+            poisson: 0.45,
+            density: 1_000.0,
+            damping: 0.01,
+            mass_damping: 0.0,
+        }
+    }
+}
+
+/// Contact parameters of a body. Between two bodies the mean of the distances, the harmonic mean of
+/// the stiffnesses and the geometric mean of the frictions count.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ContactSettings {
+    /// Coulomb friction coefficient.
+    pub friction: f64,
+    /// Surfaces closer than this push each other apart [m]; `None`: a tenth of the mean surface edge.
+    pub distance: Option<f64>,
+    /// Penalty pressure per overlap [Pa/m]; `None`: derived from the material and the mesh.
+    pub stiffness: Option<f64>,
+    /// Whether the body's own surface parts push each other apart.
+    pub self_contact: bool,
+}
+
+impl Default for ContactSettings {
+    fn default() -> Self {
+        Self { friction: 0.0, distance: None, stiffness: None, self_contact: true }
+    }
+}
+
+/// How a body is drawn.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Appearance {
+    /// Red, green, blue in 0..=1; `None`: chosen by the picture from the body's index.
+    pub color: Option<[f64; 3]>,
+    /// 0 (invisible) ..= 1 (opaque).
+    pub opacity: f64,
+}
+
+impl Default for Appearance {
+    fn default() -> Self {
+        Self { color: None, opacity: 1.0 }
+    }
+}
+
+/// Prescribed motion of a rigid body: key poses, interpolated; before the first and after the last
+/// the body rests there. No keys: the body is fixed.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct RigidMotion {
+    /// Keys with strictly increasing times.
+    pub keys: Vec<RigidKey>,
+    /// Fixed point of the rotations [m]: where the mesh file's origin was placed.
+    pub pivot: Point,
+}
+
+/// A rigid body's pose at a time, relative to where the model placed it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RigidKey {
+    /// Time [s].
+    pub time: f64,
+    /// Displacement of the pivot [m].
+    pub translation: DVec3,
+    /// Rotation about the pivot.
+    pub rotation: DQuat,
+}
+
+impl RigidMotion {
+    /// The pose at `time` [s], as a map from placed to current positions.
+    pub fn pose(&self, time: f64) -> Pose {
+        let (translation, rotation) = self.interpolate(time);
+        let pivot = DVec3::from_array(self.pivot);
+        Pose::from_rotation_translation(rotation, translation + pivot - rotation * pivot)
+    }
+
+    fn interpolate(&self, time: f64) -> (DVec3, DQuat) {
+        let next = self.keys.partition_point(|key| key.time <= time);
+        match (next.checked_sub(1).map(|i| self.keys[i]), self.keys.get(next)) {
+            (Some(before), Some(after)) => {
+                let s = (time - before.time) / (after.time - before.time);
+                let rotation = before.rotation.slerp(after.rotation, s);
+                (before.translation.lerp(after.translation, s), rotation)
+            }
+            (Some(last), None) => (last.translation, last.rotation),
+            (None, Some(first)) => (first.translation, first.rotation),
+            (None, None) => (DVec3::ZERO, DQuat::IDENTITY),
+        }
+    }
+}

@@ -1,0 +1,9 @@
+//! Object data (tetrahedral meshes and their files), the model language and the model it describes.
+
+pub mod body;
+pub mod mesh;
+
+pub use body::{
+    Appearance, Body, ContactSettings, Law, Material, Model, Pose, RigidKey, RigidMotion, Structure,
+};
+pub use mesh::{Mesh, MeshData, MeshError};
