@@ -1,0 +1,56 @@
+# The only entry: everything a fresh clone needs is Rust, Python 3.10+ and make.
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+# What the compiled core and the installed package are made from.
+SOURCES := pyproject.toml Cargo.toml Cargo.lock $(shell find crates -name '*.rs' -o -name Cargo.toml)
+# Every crate but the binding, which only links inside Python.
+CRATES := --workspace --exclude palpate-python
+
+.DEFAULT_GOAL := help
+.PHONY: help install run test test-rust test-python lint format bench models clean
+
+help: ## Show this list
+	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /\1\t/' | expand -t 14
+
+$(BIN)/maturin:
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check "maturin>=1.16,<2"
+
+$(VENV)/.installed: $(BIN)/maturin $(SOURCES)
+	VIRTUAL_ENV=$(abspath $(VENV)) $(BIN)/maturin develop --release --locked --extras all,test,lint
+	@touch $@
+
+install: $(VENV)/.installed ## Build the core and install the package into .venv
+
+run: install ## Simulate the paper's case 1: results in out/
+	$(BIN)/palpate simulate models/case1.bml --output out $(ARGS)
+
+test: test-rust test-python ## Run every test: Rust, Python, documents, examples
+
+test-rust:
+	cargo test --release --locked --quiet $(CRATES)
+
+test-python: install
+	$(BIN)/python -m pytest
+
+lint: install ## Check format, clippy, rustdoc, ruff and types
+	cargo fmt --all --check
+	cargo clippy --locked --workspace --all-targets --release -- -D warnings
+	RUSTDOCFLAGS="-D warnings" cargo doc --locked --release --no-deps --workspace --exclude palpate-python
+	$(BIN)/ruff format --check python tests examples
+	$(BIN)/ruff check python tests examples
+	$(BIN)/mypy
+	$(BIN)/python -m mypy.stubtest palpate._core
+
+format: install ## Format Rust and Python
+	cargo fmt --all
+	$(BIN)/ruff format python tests examples
+	$(BIN)/ruff check --fix python tests examples
+
+models: install ## Make the example organs again
+	$(BIN)/python python/palpate/models/make_models.py
+
+clean: ## Remove everything that was built
+	rm -rf target $(VENV) out

@@ -1,0 +1,150 @@
+//! The step loop: detect, respond, move.
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use palpate_contact::{Scene, SceneError, SceneOptions};
+use palpate_geometry::Point;
+use palpate_mechanics::{Contact, Dynamics, DynamicsOptions, MechanicsError, State, StepStats};
+use palpate_model::Model;
+
+/// How a simulation runs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SimulationOptions {
+    /// Length of a step [s].
+    pub time_step: f64,
+    /// Contact detection: leaf size, split rule, method. Its thread count is taken from `threads`.
+    pub scene: SceneOptions,
+    /// Worker threads for detection and mechanics; results are the same bits at any count.
+    pub threads: usize,
+}
+
+impl Default for SimulationOptions {
+    fn default() -> Self {
+        Self { time_step: 1.0 / 60.0, scene: SceneOptions::default(), threads: 1 }
+    }
+}
+
+/// Why a simulation could not start or go on.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum SimulationError {
+    /// The bodies' surfaces or positions were refused by the detection.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// A body cannot be simulated, or a step failed; the state is that before the step.
+    #[error(transparent)]
+    Mechanics(#[from] MechanicsError),
+    /// A body index that does not exist.
+    #[error("body {index} does not exist: the simulation has {count} bodies")]
+    NoSuchBody {
+        /// The index that was asked for.
+        index: usize,
+        /// Number of bodies.
+        count: usize,
+    },
+}
+
+/// Wall-clock time of each stage of a step.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct StepTimes {
+    /// Refit of the bounding trees.
+    pub update: Duration,
+    /// Search for close surface elements.
+    pub proximity: Duration,
+    /// Search for nodes inside other bodies.
+    pub penetration: Duration,
+    /// Prediction, contact response and elastic solve.
+    pub mechanics: Duration,
+    /// The whole step.
+    pub total: Duration,
+}
+
+/// What one step did and what it cost.
+#[derive(Clone, Debug)]
+pub struct StepReport {
+    /// Number of the step, the first being 1.
+    pub step: u64,
+    /// Simulated time at the end of the step [s].
+    pub time: f64,
+    /// Where the time went.
+    pub times: StepTimes,
+    /// Close pairs found (before those that carry no force are left out).
+    pub proximity_pairs: usize,
+    /// Nodes found inside other bodies.
+    pub penetrating_nodes: usize,
+    /// Deepest penetration [m], zero when there is none.
+    pub max_depth: f64,
+    /// The mechanics' own statistics.
+    pub mechanics: StepStats,
+}
+
+/// Bodies of a model that fall, touch and deform.
+pub struct Simulation {
+    model: Arc<Model>,
+    options: SimulationOptions,
+    scene: Scene,
+    dynamics: Dynamics,
+    initial: State,
+}
+
+impl Simulation {
+    /// Builds trees and factors for `model`; nothing moves yet.
+    ///
+    /// # Errors
+    /// If a body cannot be detected (empty mesh) or simulated (no tetrahedra and not rigid); the
+    /// error names it.
+    pub fn new(
+        model: impl Into<Arc<Model>>,
+        options: SimulationOptions,
+    ) -> Result<Self, SimulationError> {
+        let model = model.into();
+        let meshes = model.bodies.iter().map(|body| Arc::clone(&body.mesh)).collect();
+        let scene_options = SceneOptions { threads: options.threads, ..options.scene };
+        let scene = Scene::new(meshes, Some(&model.structure), scene_options)?;
+        let SimulationOptions { time_step, threads, .. } = options;
+        let dynamics = Dynamics::new(&model, DynamicsOptions { time_step, threads })?;
+        let initial = dynamics.state();
+        Ok(Self { model, options, scene, dynamics, initial })
+    }
+
+    /// Moves everything on by one time step.
+    ///
+    /// # Errors
+    /// If the step fails; the state is then that before the step.
+    pub fn step(&mut self) -> Result<StepReport, SimulationError> {
+        let start = Instant::now();
+        let mut times = StepTimes::default();
+        update_scene(&mut self.scene, &self.dynamics)?;
+        times.update = start.elapsed();
+
+        let begin = Instant::now();
+        self.dynamics.begin_step();
+        times.mechanics = begin.elapsed();
+
+        let begin = Instant::now();
+        let dynamics = &self.dynamics;
+        let deformable_pair = |a: usize, b: usize| dynamics.search_distance(a, b).is_some();
+        let penetration = self.scene.penetration(&deformable_pair).nodes.clone();
+        times.penetration = begin.elapsed();
+
+        let begin = Instant::now();
+        let proximity = self.scene.proximity(&|a, b| dynamics.search_distance(a, b));
+        times.proximity = begin.elapsed();
+
+        let begin = Instant::now();
+        let proximity_pairs = proximity.pairs.len();
+        let mechanics = self.dynamics.finish_step(&proximity.pairs, &penetration)?;
+        times.mechanics += begin.elapsed();
+        times.total = start.elapsed();
+        Ok(StepReport {
+            step: self.dynamics.state().step,
+            time: self.dynamics.time(),
+            times,
+            proximity_pairs,
+            penetrating_nodes: penetration.len(),
+            max_depth: penetration.iter().fold(0.0, |deepest, node| node.depth.max(deepest)),
+            mechanics,
+        })
+    }
+}

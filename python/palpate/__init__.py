@@ -1,0 +1,44 @@
+"""Real-time contact detection and deformation for soft bodies made of tetrahedra."""
+
+from palpate._core import __version__
+from palpate.errors import (
+    CheckpointError,
+    Diagnostic,
+    MeshError,
+    ModelError,
+    PalpateError,
+    SimulationError,
+)
+from palpate.files import read_mesh, write_mesh
+from palpate.mesh import Defect, Mesh
+from palpate.model import Body, Contact, Material, Model, RigidKey, TreeElement, read_model
+from palpate.scene import DetectionStats, Intersections, Scene
+from palpate.simulation import Contacts, Simulation, Snapshot, StepReport
+
+__all__ = [
+    "Body",
+    "CheckpointError",
+    "Contact",
+    "Contacts",
+    "Defect",
+    "DetectionStats",
+    "Diagnostic",
+    "Intersections",
+    "Material",
+    "Mesh",
+    "MeshError",
+    "Model",
+    "ModelError",
+    "PalpateError",
+    "RigidKey",
+    "Scene",
+    "Simulation",
+    "SimulationError",
+    "Snapshot",
+    "StepReport",
+    "TreeElement",
+    "__version__",
+    "read_mesh",
+    "read_model",
+    "write_mesh",
+]

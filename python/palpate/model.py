@@ -1,0 +1,274 @@
+"""The model: bodies placed in space, as a model file or Python describes them."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from palpate import _arrays, _core, files
+from palpate.errors import MeshError
+from palpate.mesh import Mesh, as_mesh
+
+#: Example models that travel with the package, by name.
+MODELS = Path(__file__).parent / "models"
+
+
+@dataclass(frozen=True)
+class Material:
+    """Material of a body; the defaults are a generic soft organ.
+
+    ``young`` [Pa], ``poisson`` in (-1, 0.5), ``density`` [kg/m³], Rayleigh ``damping``
+    proportional to stiffness [s] and ``mass_damping`` proportional to mass [1/s].
+    """
+
+    law: str = "linear"
+    young: float = 5_000.0
+    poisson: float = 0.45
+    density: float = 1_000.0
+    damping: float = 0.01
+    mass_damping: float = 0.0
+
+
+@dataclass(frozen=True)
+class Contact:
+    """Contact parameters of a body.
+
+    ``friction`` is Coulomb's coefficient; surfaces closer than ``distance`` [m] push each other
+    apart with ``stiffness`` [Pa/m]; None derives both from the mesh and the material.
+    """
+
+    friction: float = 0.0
+    distance: float | None = None
+    stiffness: float | None = None
+    self_contact: bool = True
+
+
+@dataclass(frozen=True)
+class RigidKey:
+    """Pose of a rigid body at ``time`` [s], relative to its placement.
+
+    ``translation`` [m] of, and ``rotation`` (unit quaternion, real part first) about, the place of
+    the mesh file's origin.
+    """
+
+    time: float
+    translation: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    rotation: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """One object of a model: a mesh in its place, and how it behaves.
+
+    ``rigid`` is None for a deformable body, otherwise the keys of its motion; no keys: it is
+    fixed. ``fixed_nodes`` are held in place. ``processor`` is the paper's PE, None when the body is
+    assigned automatically. ``color`` (red, green, blue in 0..1) and ``opacity`` are for pictures.
+    """
+
+    mesh: Mesh
+    name: str = "body"
+    material: Material = field(default_factory=Material)
+    fixed_nodes: npt.ArrayLike = ()
+    rigid: Sequence[RigidKey] | None = None
+    contact: Contact = field(default_factory=Contact)
+    processor: int | None = None
+    initial_velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    color: tuple[float, float, float] | None = None
+    opacity: float = 1.0
+
+    def _to_core(self) -> _core.Body:
+        as_mesh(self.mesh, f"body {self.name!r}: mesh")
+        m, c = self.material, self.contact
+        return _core.Body(
+            str(self.name),
+            self.mesh._core,
+            (m.law, m.young, m.poisson, m.density, m.damping, m.mass_damping),
+            _arrays.indices(self.fixed_nodes, f"body {self.name!r}: fixed_nodes", None),
+            None
+            if self.rigid is None
+            else [(key.time, tuple(key.translation), tuple(key.rotation)) for key in self.rigid],
+            (c.friction, c.distance, c.stiffness, c.self_contact),
+            self.processor,
+            _arrays.vector(self.initial_velocity, f"body {self.name!r}: initial_velocity"),
+            None if self.color is None else _arrays.vector(self.color, "color"),
+            float(self.opacity),
+        )
+
+    @classmethod
+    def _from_core(cls, core: _core.Body) -> Body:
+        keys = core.rigid
+        return cls(
+            mesh=Mesh._from_core(core.mesh),
+            name=core.name,
+            material=Material(*core.material),
+            fixed_nodes=core.fixed_nodes,
+            rigid=None if keys is None else tuple(RigidKey(*key) for key in keys),
+            contact=Contact(*core.contact),
+            processor=core.processor,
+            initial_velocity=core.initial_velocity,
+            color=core.color,
+            opacity=core.opacity,
+        )
+
+    def __repr__(self) -> str:
+        kind = "deformable" if self.rigid is None else "rigid"
+        return f"Body({self.name!r}, {kind}, {self.mesh!r})"
+
+
+@dataclass(frozen=True)
+class TreeElement:
+    """An element of the upper binary tree: ``CE`` joins two subtrees, ``NE`` is a body."""
+
+    kind: str
+    body: int | None
+    children: tuple[TreeElement, ...]
+
+    @classmethod
+    def _from_core(cls, structure: Any) -> TreeElement:
+        if isinstance(structure, int):
+            return cls("NE", structure, ())
+        return cls("CE", None, tuple(cls._from_core(child) for child in structure))
+
+
+class Model:
+    """Bodies, how they are joined, and gravity.
+
+    Parameters
+    ----------
+    bodies : iterable of Body or Mesh
+        At least one. Names are made unique with ``_2``, ``_3``.
+    gravity : three numbers
+        [m/s²]
+    """
+
+    __slots__ = ("__dict__", "_core")
+
+    def __init__(
+        self,
+        bodies: Iterable[Body | Mesh],
+        *,
+        gravity: Sequence[float] = (0.0, 0.0, -9.81),
+    ) -> None:
+        items = [bodies] if isinstance(bodies, (Body, Mesh)) else list(bodies)
+        cores = []
+        for index, item in enumerate(items):
+            if isinstance(item, Mesh):
+                item = Body(item, name=f"body_{index + 1}")
+            if not isinstance(item, Body):
+                raise TypeError(
+                    f"bodies[{index}]: expected a palpate.Body or palpate.Mesh, "
+                    f"got {type(item).__name__}"
+                )
+            cores.append(item._to_core())
+        self._core = _core.Model(cores, _arrays.vector(gravity, "gravity"))
+
+    @classmethod
+    def _from_core(cls, core: _core.Model) -> Model:
+        model = cls.__new__(cls)
+        model._core = core
+        return model
+
+    @cached_property
+    def bodies(self) -> tuple[Body, ...]:
+        """The bodies, placed, in the order of their TREE blocks."""
+        return tuple(Body._from_core(core) for core in self._core.bodies)
+
+    @property
+    def gravity(self) -> tuple[float, float, float]:
+        """Acceleration of gravity [m/s²]."""
+        return self._core.gravity
+
+    @cached_property
+    def tree(self) -> TreeElement:
+        """The upper binary tree (CE and NE) that the text's BRANCH and TREE blocks make."""
+        return TreeElement._from_core(self._core.structure)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What reading the meshes left out or changed."""
+        return tuple(self._core.notes)
+
+    def to_text(self) -> str:
+        """The model in canonical form of the model language.
+
+        Raises
+        ------
+        ValueError
+            If the model was made from arrays: it has no text.
+        """
+        return self._core.to_text()
+
+    def body_index(self, body: int | str) -> int:
+        """Index of a body given by index (negative from the end) or name."""
+        return body_index([each.name for each in self.bodies], body)
+
+    def __repr__(self) -> str:
+        names = ", ".join(body.name for body in self.bodies)
+        return f"Model({len(self.bodies)} bodies: {names})"
+
+
+def body_index(names: Sequence[str], body: int | str) -> int:
+    """Index of a body given by index (negative from the end) or name."""
+    if isinstance(body, str):
+        if body not in names:
+            raise ValueError(f"body: no body is named {body!r}; there are {', '.join(names)}")
+        return names.index(body)
+    if isinstance(body, bool) or not isinstance(body, (int, np.integer)):
+        raise TypeError(f"body: expected an index or a name, got {type(body).__name__}")
+    index = int(body)
+    if not -len(names) <= index < len(names):
+        raise IndexError(f"body: index {index} is out of range, there are {len(names)} bodies")
+    return index % len(names)
+
+
+def find_model(model: str | os.PathLike[str]) -> Path:
+    """Path of a model file given by path or by the name of a bundled one."""
+    path = Path(model)
+    bundled = MODELS / f"{model}.bml"
+    if not path.exists() and path.suffix == "" and bundled.exists():
+        return bundled
+    if not path.exists():
+        names = ", ".join(sorted(each.stem for each in MODELS.glob("*.bml")))
+        raise FileNotFoundError(
+            2, f"No such model file, and no bundled model of that name ({names})", str(path)
+        )
+    return path
+
+
+def read_model(path: str | os.PathLike[str], *, repair: bool = False) -> Model:
+    """Read a model file (``.bml``) or a bundled model by its name.
+
+    Meshes named by NE may have any format that `read_mesh` reads.
+
+    Parameters
+    ----------
+    path : path-like
+        The file, or the name of a bundled model such as ``"case1"``.
+    repair : bool
+        Mend inverted tetrahedra and the like in the meshes instead of refusing them.
+
+    Raises
+    ------
+    ModelError
+        With ``.path``, ``.line`` and ``.column`` of the first finding; its text shows all.
+    OSError
+        If the file cannot be opened.
+    """
+
+    def load(mesh_path: str) -> tuple[_core.Mesh, list[str]]:
+        try:
+            mesh = files.read_mesh(mesh_path, repair=repair)
+        except OSError as error:
+            raise MeshError(f"{mesh_path}: {error.strerror or error}", mesh_path) from None
+        return mesh._core, list(mesh.notes)
+
+    return Model._from_core(_core.load_model(str(find_model(path)), load))
+
+

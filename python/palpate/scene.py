@@ -1,0 +1,281 @@
+"""Contact detection alone: what touches, every time the positions change."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from palpate import _arrays, _core
+from palpate._arrays import Float64Array, IndexArray
+from palpate.mesh import Mesh, as_mesh
+from palpate.model import Body, Model, body_index, read_model
+
+#: Ways to find the touching triangles; all give the same pairs.
+METHODS = ("paper", "all-pairs", "hash")
+
+#: Where a tree node is split along the longest axis of its box.
+SPLITS = ("middle", "count")
+
+
+@dataclass(frozen=True)
+class DetectionStats:
+    """What a query cost.
+
+    Times [s] per stage: ``object_time`` (which bodies' boxes overlap), ``traversal_time`` (which
+    leaves), ``polygon_time`` (exact triangle tests). ``pair_tests`` of ``all_pairs`` triangle pairs
+    were tested.
+    """
+
+    object_time: float
+    traversal_time: float
+    polygon_time: float
+    object_pairs: int
+    nodes_visited: int
+    box_tests: int
+    pair_tests: int
+    all_pairs: int
+
+    @property
+    def fraction(self) -> float:
+        """Fraction of all triangle pairs that was tested."""
+        return self.pair_tests / self.all_pairs if self.all_pairs else 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Intersections:
+    """Surface triangles that meet, sorted.
+
+    ``pairs`` has shape (k, 4): body_a, triangle_a, body_b, triangle_b, with
+    (body_a, triangle_a) < (body_b, triangle_b); read-only.
+    """
+
+    pairs: IndexArray
+    stats: DetectionStats
+
+    @property
+    def bodies(self) -> IndexArray:
+        """The two bodies of each pair, shape (k, 2)."""
+        return self.pairs[:, 0::2]
+
+    @property
+    def triangles(self) -> IndexArray:
+        """The two triangles of each pair, shape (k, 2)."""
+        return self.pairs[:, 1::2]
+
+    def __len__(self) -> int:
+        return len(self.pairs)
+
+    def __repr__(self) -> str:
+        return f"Intersections({len(self)} pairs, {self.stats.fraction:.2g} of all pairs tested)"
+
+
+class Scene:
+    """Finds touching surfaces, between bodies and within each.
+
+    Parameters
+    ----------
+    bodies : Model, path of a model, or iterable of Mesh or Body
+        What is in the scene. A single mesh will do.
+    leaf_size : int, optional
+        Most tetrahedra in a leaf of the bounding tree (the paper's K).
+    split : {"middle", "count"}
+        Where a box is split along its longest axis: in the middle of its centroids' space, or so
+        that both sides hold equally many.
+    method : {"paper", "all-pairs", "hash"}
+        The paper's tree, the double loop over all triangles, or spatial hashing (Teschner et al.
+        2003). All give the same pairs.
+    threads : int
+        Worker threads; the result does not depend on it.
+
+    Examples
+    --------
+    >>> import palpate
+    >>> scene = palpate.Scene("small")
+    >>> len(scene.intersections())
+    0
+    """
+
+    def __init__(
+        self,
+        bodies: Model | str | os.PathLike[str] | Mesh | Iterable[Mesh | Body] = (),
+        *,
+        leaf_size: int | None = None,
+        split: str = "middle",
+        method: str = "paper",
+        threads: int = 1,
+    ) -> None:
+        meshes, self._names, structure = _scene_parts(bodies)
+        self._meshes = meshes
+        self._core = _core.Scene(
+            [mesh._core for mesh in meshes],
+            structure,
+            None if leaf_size is None else _arrays.count(leaf_size, "leaf_size"),
+            _choice(split, "split", SPLITS),
+            _choice(method, "method", METHODS),
+            _arrays.count(threads, "threads"),
+        )
+
+    def __len__(self) -> int:
+        return len(self._meshes)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Name of each body."""
+        return tuple(self._names)
+
+    @property
+    def meshes(self) -> tuple[Mesh, ...]:
+        """Mesh of each body, with its rest positions."""
+        return tuple(self._meshes)
+
+    @property
+    def node_offsets(self) -> IndexArray:
+        """First row of each body in stacked positions, and the total; shape (bodies + 1,)."""
+        return _offsets(len(mesh.nodes) for mesh in self._meshes)
+
+    @property
+    def triangle_offsets(self) -> IndexArray:
+        """First triangle of each body in a stacked numbering, and the total."""
+        return _offsets(len(mesh.triangles) for mesh in self._meshes)
+
+    def add(self, body: Mesh | Body, *, name: str | None = None) -> int:
+        """Add a body at its mesh's positions; returns its index."""
+        mesh = body.mesh if isinstance(body, Body) else as_mesh(body, "body")
+        index = self._core.add(mesh._core)
+        self._meshes.append(mesh)
+        default = body.name if isinstance(body, Body) else f"body_{index + 1}"
+        self._names.append(_unique(name or default, self._names))
+        return index
+
+    def remove(self, body: int | str) -> None:
+        """Remove a body; those after it move down by one index."""
+        index = body_index(self._names, body)
+        self._core.remove(index)
+        del self._meshes[index], self._names[index]
+
+    def replace(self, body: int | str, mesh: Mesh) -> None:
+        """Give a body another mesh (after a change of topology); its positions are the mesh's."""
+        index = body_index(self._names, body)
+        self._core.replace(index, as_mesh(mesh, "mesh")._core)
+        self._meshes[index] = mesh
+
+    def update(self, positions: Sequence[npt.ArrayLike] | npt.ArrayLike) -> None:
+        """Move every body and refit the bounding trees.
+
+        Parameters
+        ----------
+        positions : sequence of (n, 3) arrays, one per body, or one stacked (N, 3) array
+            Node positions [m]. C-contiguous float64 is read without conversion. A stacked array
+            holds the bodies one after the other, see `node_offsets`.
+
+        Raises
+        ------
+        ValueError, TypeError
+            If shapes, dtypes or values do not fit; the scene then stays as it was.
+        """
+        self._core.update(split_positions(positions, [len(mesh.nodes) for mesh in self._meshes]))
+
+    def positions(self, body: int | str) -> Float64Array:
+        """Current node positions [m] of a body, shape (n, 3), read-only."""
+        return self._core.positions(body_index(self._names, body))
+
+    def intersections(self, *, self_contact: bool = True, same_leaf: bool = True) -> Intersections:
+        """Every pair of surface triangles that meet, decided exactly for the given positions.
+
+        Touching and coplanar overlap count; two triangles of one body that share a node do not.
+
+        Parameters
+        ----------
+        self_contact : bool
+            Whether each body is also tested against itself.
+        same_leaf : bool
+            Whether triangles in one leaf are tested against each other. The paper leaves them out;
+            with True the result is complete at any leaf size.
+        """
+        pairs, stats = self._core.intersections(bool(self_contact), bool(same_leaf))
+        return Intersections(pairs, DetectionStats(*stats))
+
+    def tree_stats(self, body: int | str) -> dict[str, Any]:
+        """Counts of a body's bounding tree: nodes, leaves, depth, how full the leaves are."""
+        return self._core.tree_stats(body_index(self._names, body))
+
+    @property
+    def update_time(self) -> float:
+        """Duration [s] of the refit in the last `update`."""
+        return self._core.update_time
+
+    def __repr__(self) -> str:
+        total = sum(len(mesh.triangles) for mesh in self._meshes)
+        return f"Scene({len(self)} bodies, {total} surface triangles)"
+
+
+def split_positions(
+    positions: Sequence[npt.ArrayLike] | npt.ArrayLike, counts: Sequence[int]
+) -> list[Float64Array]:
+    """One (n, 3) array per body from a sequence of them or from a stacked (N, 3) array."""
+    total = sum(counts)
+    stacked = isinstance(positions, np.ndarray) and positions.ndim == 2
+    if not stacked and not isinstance(positions, (list, tuple)):
+        raise TypeError(
+            "positions: expected a sequence of (n, 3) arrays or one stacked array of shape "
+            f"({total}, 3), got {_describe(positions)}"
+        )
+    if stacked:
+        array = _arrays.points(positions, "positions", total)
+        ends = np.cumsum(counts)
+        return [array[end - count : end] for end, count in zip(ends, counts, strict=True)]
+    if len(positions) != len(counts):
+        raise ValueError(
+            f"positions: expected {len(counts)} arrays, one per body, got {len(positions)}"
+        )
+    return [
+        _arrays.points(part, f"positions[{index}]", count)
+        for index, (part, count) in enumerate(zip(positions, counts, strict=True))
+    ]
+
+
+def _describe(value: Any) -> str:
+    if isinstance(value, np.ndarray):
+        return f"an array of shape {value.shape}"
+    return type(value).__name__
+
+
+def _offsets(counts: Iterable[int]) -> IndexArray:
+    offsets = np.concatenate([[0], np.cumsum(list(counts), dtype=np.int64)]).astype(np.int32)
+    offsets.setflags(write=False)
+    return offsets
+
+
+def _choice(value: Any, name: str, allowed: Sequence[str]) -> str:
+    if value not in allowed:
+        raise ValueError(f"{name}: expected one of {', '.join(allowed)}; got {value!r}")
+    return str(value)
+
+
+def _unique(name: str, names: Sequence[str]) -> str:
+    candidate, number = name, 1
+    while candidate in names:
+        number += 1
+        candidate = f"{name}_{number}"
+    return candidate
+
+
+def _scene_parts(bodies: Any) -> tuple[list[Mesh], list[str], Any]:
+    if isinstance(bodies, (str, os.PathLike)):
+        bodies = read_model(bodies)
+    if isinstance(bodies, Model):
+        meshes = [body.mesh for body in bodies.bodies]
+        return meshes, [body.name for body in bodies.bodies], bodies._core.structure
+    items = [bodies] if isinstance(bodies, (Mesh, Body)) else list(bodies)
+    meshes, names = [], []
+    for index, item in enumerate(items):
+        mesh = item.mesh if isinstance(item, Body) else as_mesh(item, f"bodies[{index}]")
+        name = item.name if isinstance(item, Body) else f"body_{index + 1}"
+        meshes.append(mesh)
+        names.append(_unique(name, names))
+    return meshes, names, None

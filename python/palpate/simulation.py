@@ -1,0 +1,250 @@
+"""The simulation: bodies that fall, touch, deform and come to rest."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from palpate import _arrays, _core
+from palpate._arrays import Float64Array, IndexArray
+from palpate.mesh import Mesh
+from palpate.model import Body, Model, body_index, read_model
+from palpate.scene import METHODS, SPLITS, Intersections, Scene, _choice
+
+
+@dataclass(frozen=True)
+class StepReport:
+    """What the last of the asked steps did, and what all of them cost.
+
+    ``times`` maps a stage to seconds, summed over the steps; ``contacts`` carry a force,
+    ``penetrating_nodes`` were inside another body at the start of the last step, by at most
+    ``max_depth`` [m]; ``iterations`` of the linear solver are summed; ``residual`` is relative.
+    """
+
+    step: int
+    time: float
+    times: dict[str, float]
+    proximity_pairs: int
+    contacts: int
+    self_contacts: int
+    penetrating_nodes: int
+    max_depth: float
+    newton_iterations: int
+    iterations: int
+    residual: float
+
+
+@dataclass(frozen=True, eq=False)
+class Contacts:
+    """Contacts that carried a force in the last step.
+
+    ``nodes`` and ``weights`` (k, 4) are the contact's Jacobian: the gap is the weighted sum of the
+    nodes' positions along ``normals`` (k, 3), which points from side b to side a. The first nodes
+    belong to ``bodies[:, 0]``: one of a vertex-triangle contact (``kinds`` 0), two of an edge-edge
+    contact (``kinds`` 1). ``gaps`` [m] are negative when penetrating; ``points`` [m] lie on side b;
+    ``forces`` (k, 3) [N] act on side a, their negative on side b.
+    """
+
+    kinds: IndexArray
+    bodies: IndexArray
+    nodes: IndexArray
+    weights: Float64Array
+    normals: Float64Array
+    points: Float64Array
+    gaps: Float64Array
+    forces: Float64Array
+
+    def __len__(self) -> int:
+        return len(self.gaps)
+
+
+class Simulation:
+    """Bodies of a model, moved step by step.
+
+    Parameters
+    ----------
+    model : Model, path of a model, or iterable of Body or Mesh
+        What is simulated.
+    time_step : float
+        [s]
+    threads : int
+        Worker threads. Results are the same bits at any number.
+    leaf_size, split, method
+        Contact detection, as in `Scene`.
+
+    Examples
+    --------
+    >>> import palpate
+    >>> simulation = palpate.Simulation("small")
+    >>> report = simulation.step(5)
+    >>> round(simulation.time * 60)
+    5
+    """
+
+    def __init__(
+        self,
+        model: Model | str | os.PathLike[str] | Iterable[Body | Mesh],
+        *,
+        time_step: float = 1.0 / 60.0,
+        threads: int = 1,
+        leaf_size: int | None = None,
+        split: str = "middle",
+        method: str = "paper",
+    ) -> None:
+        if isinstance(model, (str, os.PathLike)):
+            model = read_model(model)
+        if not isinstance(model, Model):
+            model = Model(model)
+        time_step = _arrays.scalar(time_step, "time_step")
+        if time_step <= 0:
+            raise ValueError(f"time_step: expected a positive number of seconds, got {time_step}")
+        self._start(
+            _core.Simulation(
+                model._core,
+                time_step,
+                _arrays.count(threads, "threads"),
+                None if leaf_size is None else _arrays.count(leaf_size, "leaf_size"),
+                _choice(split, "split", SPLITS),
+                _choice(method, "method", METHODS),
+            )
+        )
+
+    def _start(self, core: _core.Simulation) -> None:
+        self._core = core
+        self._model = Model._from_core(core.model)
+        self._names = [body.name for body in self._model.bodies]
+        self._counts = [len(body.mesh.nodes) for body in self._model.bodies]
+
+    @property
+    def model(self) -> Model:
+        """The model that is simulated."""
+        return self._model
+
+    @property
+    def time(self) -> float:
+        """Simulated time [s]."""
+        return self._core.time
+
+    @property
+    def time_step(self) -> float:
+        """Length of a step [s]."""
+        return self._core.time_step
+
+    @property
+    def positions(self) -> tuple[Float64Array, ...]:
+        """Node positions [m] of each body, shape (n, 3), read-only; they never change later."""
+        return self._core.positions
+
+    @property
+    def velocities(self) -> tuple[Float64Array, ...]:
+        """Node velocities [m/s] of each body, shape (n, 3), read-only."""
+        return self._core.velocities
+
+    @property
+    def contact_forces(self) -> tuple[Float64Array, ...]:
+        """Contact force [N] on each node in the last step, per body, shape (n, 3)."""
+        return self._core.contact_forces
+
+    @property
+    def contacts(self) -> Contacts:
+        """Contacts that carried a force in the last step."""
+        return Contacts(*self._core.contacts)
+
+    def step(self, count: int = 1) -> StepReport:
+        """Move on by ``count`` time steps.
+
+        Raises
+        ------
+        SimulationError
+            If a step fails; the state is then that before the failed step.
+        """
+        return StepReport(**self._core.step(_arrays.count(count, "count")))
+
+    def set_positions(self, body: int | str, positions: npt.ArrayLike) -> None:
+        """Put the nodes of a body elsewhere; positions [m], shape (n, 3)."""
+        index = self._index(body)
+        self._core.set_positions(index, self._points(positions, "positions", index))
+
+    def set_velocities(self, body: int | str, velocities: npt.ArrayLike) -> None:
+        """Set the velocities [m/s] of a body's nodes, shape (n, 3)."""
+        index = self._index(body)
+        self._core.set_velocities(index, self._points(velocities, "velocities", index))
+
+    def set_forces(self, body: int | str, forces: npt.ArrayLike) -> None:
+        """Set external forces [N] on a body's nodes, shape (n, 3); they act until set again."""
+        index = self._index(body)
+        self._core.set_forces(index, self._points(forces, "forces", index))
+
+    def intersections(self, *, self_contact: bool = True) -> Intersections:
+        """Surface triangles that meet right now; see `Scene.intersections`."""
+        scene = Scene(self._model)
+        scene.update(list(self.positions))
+        return scene.intersections(self_contact=self_contact)
+
+    def energy(self) -> dict[str, float]:
+        """Kinetic, elastic and gravitational energy [J] of the deformable bodies."""
+        return self._core.energy()
+
+    def snapshot(self) -> Snapshot:
+        """The whole state, to come back to with `restore`."""
+        return Snapshot(self._core.snapshot())
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Return to a snapshot of this simulation; it continues with the same bits."""
+        if not isinstance(snapshot, Snapshot):
+            raise TypeError(f"snapshot: expected a Snapshot, got {type(snapshot).__name__}")
+        self._core.restore(snapshot._core)
+
+    def reset(self) -> None:
+        """Return to the start."""
+        self._core.reset()
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write a checkpoint: model, meshes and state in one file, complete or absent."""
+        self._core.save(os.fspath(path))
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str], *, threads: int = 1) -> Simulation:
+        """Continue from a checkpoint, bit for bit.
+
+        Raises
+        ------
+        CheckpointError
+            If the file is damaged or not a checkpoint.
+        """
+        simulation = cls.__new__(cls)
+        simulation._start(
+            _core.Simulation.load(os.fspath(path), _arrays.count(threads, "threads"))
+        )
+        return simulation
+
+    def _index(self, body: int | str) -> int:
+        return body_index(self._names, body)
+
+    def _points(self, values: npt.ArrayLike, name: str, index: int) -> Float64Array:
+        array = _arrays.points(values, name, self._counts[index])
+        if not np.isfinite(array).all():
+            node = int(np.argwhere(~np.isfinite(array).all(axis=1))[0, 0])
+            raise ValueError(f"{name}: node {node} is not finite: {array[node].tolist()}")
+        return array
+
+    def __repr__(self) -> str:
+        return f"Simulation({len(self._names)} bodies, t = {self.time:.4g} s)"
+
+
+class Snapshot:
+    """State of a simulation at a time."""
+
+    __slots__ = ("_core",)
+
+    def __init__(self, core: _core.Snapshot) -> None:
+        self._core = core
+
+    @property
+    def time(self) -> float:
+        """Simulated time [s]."""
+        return self._core.time
