@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy.typing as npt
@@ -53,8 +54,6 @@ class Mesh:
         If the arrays do not make a mesh; the message names the element and the fix.
     """
 
-    __slots__ = ("_core", "_notes")
-
     def __init__(
         self,
         nodes: npt.ArrayLike,
@@ -89,32 +88,32 @@ class Mesh:
         mesh._notes = notes or []
         return mesh
 
-    @property
+    @cached_property
     def nodes(self) -> Float64Array:
         """Node positions [m], shape (n, 3), read-only."""
         return self._core.nodes
 
-    @property
+    @cached_property
     def tetrahedra(self) -> IndexArray:
         """Node indices of the tetrahedra, shape (m, 4), read-only; m = 0 for a surface."""
         return self._core.tetrahedra
 
-    @property
+    @cached_property
     def triangles(self) -> IndexArray:
         """Surface triangles, shape (t, 3), outward, read-only."""
         return self._core.triangles
 
-    @property
+    @cached_property
     def triangle_owners(self) -> IndexArray:
         """Tetrahedron that owns each surface triangle, shape (t,); empty for a surface."""
         return self._core.triangle_owners
 
-    @property
+    @cached_property
     def surface_nodes(self) -> IndexArray:
         """Sorted indices of the nodes on the surface."""
         return self._core.surface_nodes
 
-    @property
+    @cached_property
     def surface_edges(self) -> IndexArray:
         """Edges of the surface, shape (e, 2), smaller node first, sorted."""
         return self._core.surface_edges
@@ -124,12 +123,12 @@ class Mesh:
         """Named node sets, each sorted."""
         return self._core.node_sets
 
-    @property
+    @cached_property
     def regions(self) -> IndexArray | None:
         """Region number of each tetrahedron, shape (m,), or None."""
         return self._core.regions
 
-    @property
+    @cached_property
     def volume(self) -> float:
         """Volume [m³]: of the tetrahedra, or enclosed by a closed surface."""
         return self._core.volume

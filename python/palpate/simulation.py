@@ -13,7 +13,7 @@ from palpate import _arrays, _core
 from palpate._arrays import Float64Array, IndexArray
 from palpate.mesh import Mesh
 from palpate.model import Body, Model, body_index, read_model
-from palpate.scene import METHODS, SPLITS, Intersections, Scene, _choice
+from palpate.scene import METHODS, SPLITS, DetectionStats, Intersections, _choice
 
 
 @dataclass(frozen=True)
@@ -181,9 +181,8 @@ class Simulation:
 
     def intersections(self, *, self_contact: bool = True) -> Intersections:
         """Surface triangles that meet right now; see `Scene.intersections`."""
-        scene = Scene(self._model)
-        scene.update(list(self.positions))
-        return scene.intersections(self_contact=self_contact)
+        pairs, stats = self._core.intersections(bool(self_contact))
+        return Intersections(pairs, DetectionStats(*stats))
 
     def energy(self) -> dict[str, float]:
         """Kinetic, elastic and gravitational energy [J] of the deformable bodies."""

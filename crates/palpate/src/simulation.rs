@@ -1,5 +1,6 @@
 //! The step loop: detect, respond, move.
 
+use std::ops::AddAssign;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -58,6 +59,29 @@ pub struct StepTimes {
     pub mechanics: Duration,
     /// The whole step.
     pub total: Duration,
+}
+
+impl StepTimes {
+    /// Each stage by its name, in the order of the step.
+    pub fn named(&self) -> [(&'static str, Duration); 5] {
+        [
+            ("update", self.update),
+            ("penetration", self.penetration),
+            ("proximity", self.proximity),
+            ("mechanics", self.mechanics),
+            ("total", self.total),
+        ]
+    }
+}
+
+impl AddAssign for StepTimes {
+    fn add_assign(&mut self, other: Self) {
+        self.update += other.update;
+        self.proximity += other.proximity;
+        self.penetration += other.penetration;
+        self.mechanics += other.mechanics;
+        self.total += other.total;
+    }
 }
 
 /// What one step did and what it cost.
@@ -147,4 +171,116 @@ impl Simulation {
             mechanics,
         })
     }
+
+    /// The model that is simulated.
+    pub fn model(&self) -> &Arc<Model> {
+        &self.model
+    }
+
+    /// The options it was made with.
+    pub fn options(&self) -> &SimulationOptions {
+        &self.options
+    }
+
+    /// Simulated time [s].
+    pub fn time(&self) -> f64 {
+        self.dynamics.time()
+    }
+
+    /// Node positions [m] of a body.
+    ///
+    /// # Panics
+    /// If `body` is out of range, as in all getters here.
+    pub fn positions(&self, body: usize) -> &[Point] {
+        self.dynamics.positions(body)
+    }
+
+    /// Node velocities [m/s] of a body.
+    pub fn velocities(&self, body: usize) -> &[Point] {
+        self.dynamics.velocities(body)
+    }
+
+    /// Contacts that carried a force in the last step.
+    pub fn contacts(&self) -> &[Contact] {
+        self.dynamics.contacts()
+    }
+
+    /// Contact force [N] on each node of a body in the last step.
+    pub fn contact_force(&self, body: usize) -> &[Point] {
+        self.dynamics.contact_force(body)
+    }
+
+    /// Puts the nodes of a body elsewhere.
+    ///
+    /// # Errors
+    /// If the body does not exist, or the number of nodes or a value does not fit.
+    pub fn set_positions(&mut self, body: usize, positions: &[Point]) -> Result<(), SimulationError> {
+        self.check_body(body)?;
+        Ok(self.dynamics.set_positions(body, positions)?)
+    }
+
+    /// Sets the velocities [m/s] of a body's nodes.
+    ///
+    /// # Errors
+    /// As [`Self::set_positions`].
+    pub fn set_velocities(&mut self, body: usize, velocities: &[Point]) -> Result<(), SimulationError> {
+        self.check_body(body)?;
+        Ok(self.dynamics.set_velocities(body, velocities)?)
+    }
+
+    /// Sets external forces [N] on a body's nodes; they act until set again.
+    ///
+    /// # Errors
+    /// As [`Self::set_positions`].
+    pub fn set_forces(&mut self, body: usize, forces: &[Point]) -> Result<(), SimulationError> {
+        self.check_body(body)?;
+        Ok(self.dynamics.set_forces(body, forces)?)
+    }
+
+    /// The scene at the current positions, for queries.
+    ///
+    /// # Errors
+    /// If a position is not finite.
+    pub fn scene(&mut self) -> Result<&mut Scene, SimulationError> {
+        update_scene(&mut self.scene, &self.dynamics)?;
+        Ok(&mut self.scene)
+    }
+
+    /// The whole state, to come back to with [`Self::restore`].
+    pub fn snapshot(&self) -> State {
+        self.dynamics.state()
+    }
+
+    /// Returns to a snapshot of this simulation; it continues with the same bits.
+    ///
+    /// # Errors
+    /// If the state is of another model.
+    pub fn restore(&mut self, state: &State) -> Result<(), SimulationError> {
+        Ok(self.dynamics.set_state(state)?)
+    }
+
+    /// Returns to the start.
+    ///
+    /// # Errors
+    /// Never for the simulation's own initial state; kept fallible like [`Self::restore`].
+    pub fn reset(&mut self) -> Result<(), SimulationError> {
+        Ok(self.dynamics.set_state(&self.initial)?)
+    }
+
+    /// The mechanics, for energies and momenta.
+    pub fn dynamics(&self) -> &Dynamics {
+        &self.dynamics
+    }
+
+    fn check_body(&self, index: usize) -> Result<(), SimulationError> {
+        let count = self.model.bodies.len();
+        if index < count { Ok(()) } else { Err(SimulationError::NoSuchBody { index, count }) }
+    }
+}
+
+fn update_scene(scene: &mut Scene, dynamics: &Dynamics) -> Result<(), SceneError> {
+    let positions: Vec<&[Point]> =
+        (0..scene.body_count()).map(|body| dynamics.positions(body)).collect();
+    scene.update(&positions)?;
+    Ok(())
 }

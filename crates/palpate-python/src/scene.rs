@@ -1,0 +1,158 @@
+//! `palpate._core.Scene`: contact detection on the caller's positions.
+
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use numpy::{PyArray2, PyReadonlyArray2};
+use palpate::contact::{DetectionStats, IntersectionOptions, Method, Split};
+use palpate::geometry::Point;
+use palpate::{Scene, SceneOptions};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use crate::arrays::{index_matrix, matrix, points};
+use crate::errors::raise;
+use crate::mesh::PyMesh;
+use crate::model::structure_from_python;
+
+/// Times [s] and counts of a query, in the order of `palpate.DetectionStats`.
+pub(crate) type StatsRow = (f64, f64, f64, usize, u64, u64, u64, u64);
+
+/// Bodies and their bounding trees. The lock lets two Python threads use one scene in turn.
+#[pyclass(frozen, name = "Scene", module = "palpate._core")]
+pub(crate) struct PyScene {
+    scene: Mutex<(Scene, Duration)>,
+}
+
+impl PyScene {
+    fn lock(&self) -> MutexGuard<'_, (Scene, Duration)> {
+        self.scene.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+#[pymethods]
+impl PyScene {
+    #[new]
+    fn new(
+        py: Python<'_>,
+        meshes: Vec<PyRef<'_, PyMesh>>,
+        structure: Option<&Bound<'_, PyAny>>,
+        leaf_size: Option<usize>,
+        split: &str,
+        method: &str,
+        threads: usize,
+    ) -> PyResult<Self> {
+        let structure = structure.map(structure_from_python).transpose()?;
+        let options = scene_options(leaf_size, split, method, threads)?;
+        let meshes = meshes.iter().map(|mesh| mesh.mesh.clone()).collect();
+        let scene = raise(py, py.detach(|| Scene::new(meshes, structure.as_ref(), options)))?;
+        Ok(Self { scene: Mutex::new((scene, Duration::ZERO)) })
+    }
+
+    fn add(&self, py: Python<'_>, mesh: &PyMesh) -> PyResult<usize> {
+        let mesh = mesh.mesh.clone();
+        raise(py, py.detach(|| self.lock().0.add(mesh)))
+    }
+
+    fn remove(&self, py: Python<'_>, body: usize) -> PyResult<()> {
+        raise(py, py.detach(|| self.lock().0.remove(body)))?;
+        Ok(())
+    }
+
+    fn replace(&self, py: Python<'_>, body: usize, mesh: &PyMesh) -> PyResult<()> {
+        let mesh = mesh.mesh.clone();
+        raise(py, py.detach(|| self.lock().0.replace(body, mesh)))?;
+        Ok(())
+    }
+
+    fn update(&self, py: Python<'_>, positions: Vec<PyReadonlyArray2<'_, f64>>) -> PyResult<()> {
+        let slices: Vec<&[Point]> =
+            positions.iter().map(|array| points(array, "positions")).collect::<PyResult<_>>()?;
+        // Not detached: the arrays belong to Python, which could change them meanwhile.
+        let mut guard = self.lock();
+        let stats = raise(py, guard.0.update(&slices))?;
+        guard.1 = stats.time;
+        Ok(())
+    }
+
+    #[getter]
+    fn update_time(&self) -> f64 {
+        self.lock().1.as_secs_f64()
+    }
+
+    fn positions<'py>(&self, py: Python<'py>, body: usize) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let copy = self.lock().0.positions(body).to_vec();
+        matrix(py, copy)
+    }
+
+    fn intersections<'py>(
+        &self,
+        py: Python<'py>,
+        self_contact: bool,
+        same_leaf: bool,
+    ) -> PyResult<(Bound<'py, PyArray2<i32>>, StatsRow)> {
+        let options = IntersectionOptions { self_contact, same_leaf };
+        let (rows, stats) = py.detach(|| {
+            let mut guard = self.lock();
+            let found = guard.0.intersections(&options);
+            let row = |pair: &palpate::contact::TrianglePair| {
+                [pair.body_a, pair.triangle_a, pair.body_b, pair.triangle_b]
+            };
+            (found.pairs.iter().map(row).collect::<Vec<_>>(), stats_row(&found.stats))
+        });
+        Ok((index_matrix(py, &rows)?, stats))
+    }
+
+    fn tree_stats<'py>(&self, py: Python<'py>, body: usize) -> PyResult<Bound<'py, PyDict>> {
+        let guard = self.lock();
+        let tree = guard.0.tree(body);
+        let stats = tree.stats();
+        let row = PyDict::new(py);
+        row.set_item("elements", stats.element_count)?;
+        row.set_item("nodes", stats.node_count)?;
+        row.set_item("leaves", stats.leaf_count)?;
+        row.set_item("empty_leaves", stats.empty_leaf_count)?;
+        row.set_item("depth_max", stats.depth_max)?;
+        row.set_item("depth_mean", stats.depth_mean)?;
+        row.set_item("leaf_size", stats.leaf_size)?;
+        row.set_item("leaf_fill", stats.leaf_fill.clone())?;
+        Ok(row)
+    }
+}
+
+/// The statistics as a row for Python.
+pub(crate) fn stats_row(stats: &DetectionStats) -> StatsRow {
+    (
+        stats.object_time.as_secs_f64(),
+        stats.traversal_time.as_secs_f64(),
+        stats.polygon_time.as_secs_f64(),
+        stats.object_pairs as usize,
+        stats.nodes_visited,
+        stats.box_tests,
+        stats.pair_tests,
+        stats.all_pairs,
+    )
+}
+
+/// Options from the words that Python uses; the words were checked there already.
+pub(crate) fn scene_options(
+    leaf_size: Option<usize>,
+    split: &str,
+    method: &str,
+    threads: usize,
+) -> PyResult<SceneOptions> {
+    let defaults = SceneOptions::default();
+    let split = match split {
+        "middle" => Split::Middle,
+        "count" => Split::Count,
+        other => return Err(PyValueError::new_err(format!("split: unknown {other:?}"))),
+    };
+    let method = match method {
+        "paper" => Method::Paper,
+        "all-pairs" => Method::AllPairs,
+        "hash" => Method::Hash,
+        other => return Err(PyValueError::new_err(format!("method: unknown {other:?}"))),
+    };
+    Ok(SceneOptions { leaf_size: leaf_size.unwrap_or(defaults.leaf_size), split, method, threads })
+}

@@ -1,0 +1,250 @@
+//! `palpate._core.Simulation`: the step loop, its state and its checkpoints.
+
+use std::path::PathBuf;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use numpy::{PyArray1, PyArray2, PyReadonlyArray2};
+use palpate::contact::{IntersectionOptions, PairKind};
+use palpate::geometry::Point;
+use palpate::mechanics::State;
+use palpate::{Simulation, SimulationOptions, StepReport, StepTimes};
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyTuple};
+
+use crate::arrays::{index_matrix, matrix, points, vector};
+use crate::errors::raise;
+use crate::model::PyModel;
+use crate::scene::{StatsRow, scene_options, stats_row};
+
+/// A state to come back to.
+#[pyclass(frozen, name = "Snapshot", module = "palpate._core")]
+pub(crate) struct PySnapshot {
+    state: State,
+}
+
+#[pymethods]
+impl PySnapshot {
+    #[getter]
+    fn time(&self) -> f64 {
+        self.state.time
+    }
+}
+
+/// Bodies in motion. The lock lets two Python threads use one simulation in turn.
+#[pyclass(frozen, name = "Simulation", module = "palpate._core")]
+pub(crate) struct PySimulation {
+    simulation: Mutex<Simulation>,
+}
+
+impl PySimulation {
+    fn lock(&self) -> MutexGuard<'_, Simulation> {
+        self.simulation.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn per_body<'py>(
+        &self,
+        py: Python<'py>,
+        values: impl Fn(&Simulation, usize) -> Vec<Point>,
+    ) -> PyResult<Bound<'py, PyTuple>> {
+        let guard = self.lock();
+        let arrays = (0..guard.model().bodies.len())
+            .map(|body| matrix(py, values(&guard, body)))
+            .collect::<PyResult<Vec<_>>>()?;
+        PyTuple::new(py, arrays)
+    }
+}
+
+/// The columns of `palpate.Contacts`.
+type ContactColumns<'py> = (
+    Bound<'py, PyArray1<i32>>,
+    Bound<'py, PyArray2<i32>>,
+    Bound<'py, PyArray2<i32>>,
+    Bound<'py, PyArray2<f64>>,
+    Bound<'py, PyArray2<f64>>,
+    Bound<'py, PyArray2<f64>>,
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray2<f64>>,
+);
+
+#[pymethods]
+impl PySimulation {
+    #[new]
+    fn new(
+        py: Python<'_>,
+        model: &PyModel,
+        time_step: f64,
+        threads: usize,
+        leaf_size: Option<usize>,
+        split: &str,
+        method: &str,
+    ) -> PyResult<Self> {
+        let scene = scene_options(leaf_size, split, method, threads)?;
+        let options = SimulationOptions { time_step, scene, threads };
+        let model = model.model.clone();
+        let simulation = raise(py, py.detach(|| Simulation::new(model, options)))?;
+        Ok(Self { simulation: Mutex::new(simulation) })
+    }
+
+    #[getter]
+    fn model(&self) -> PyModel {
+        PyModel { model: self.lock().model().clone() }
+    }
+
+    #[getter]
+    fn time(&self) -> f64 {
+        self.lock().time()
+    }
+
+    #[getter]
+    fn time_step(&self) -> f64 {
+        self.lock().options().time_step
+    }
+
+    #[getter]
+    fn positions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
+        self.per_body(py, |simulation, body| simulation.positions(body).to_vec())
+    }
+
+    #[getter]
+    fn velocities<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
+        self.per_body(py, |simulation, body| simulation.velocities(body).to_vec())
+    }
+
+    #[getter]
+    fn contact_forces<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
+        self.per_body(py, |simulation, body| simulation.contact_force(body).to_vec())
+    }
+
+    #[getter]
+    fn contacts<'py>(&self, py: Python<'py>) -> PyResult<ContactColumns<'py>> {
+        let guard = self.lock();
+        let contacts = guard.contacts();
+        let kinds = contacts.iter().map(|c| i32::from(c.kind == PairKind::EdgeEdge)).collect();
+        let bodies: Vec<_> = contacts.iter().map(|c| c.bodies).collect();
+        let nodes: Vec<_> = contacts.iter().map(|c| c.nodes).collect();
+        Ok((
+            vector(py, kinds),
+            index_matrix(py, &bodies)?,
+            index_matrix(py, &nodes)?,
+            matrix(py, contacts.iter().map(|c| c.weights).collect())?,
+            matrix(py, contacts.iter().map(|c| c.normal).collect())?,
+            matrix(py, contacts.iter().map(|c| c.point).collect())?,
+            vector(py, contacts.iter().map(|c| c.gap).collect()),
+            matrix(py, contacts.iter().map(|c| c.force()).collect())?,
+        ))
+    }
+
+    /// Steps `count` times; what `palpate.StepReport` holds.
+    fn step<'py>(&self, py: Python<'py>, count: usize) -> PyResult<Bound<'py, PyDict>> {
+        let (report, times, iterations, newton) = {
+            let mut summed = StepTimes::default();
+            let (mut iterations, mut newton) = (0, 0);
+            let mut last: Option<StepReport> = None;
+            for _ in 0..count {
+                // One step at a time, so that Ctrl-C is answered between them.
+                py.check_signals()?;
+                let report = raise(py, py.detach(|| self.lock().step()))?;
+                summed += report.times;
+                iterations += report.mechanics.iterations;
+                newton += report.mechanics.newton_iterations;
+                last = Some(report);
+            }
+            (last.expect("count is at least one"), summed, iterations, newton)
+        };
+        let seconds = PyDict::new(py);
+        for (stage, time) in times.named() {
+            seconds.set_item(stage, time.as_secs_f64())?;
+        }
+        let row = PyDict::new(py);
+        row.set_item("step", report.step)?;
+        row.set_item("time", report.time)?;
+        row.set_item("times", seconds)?;
+        row.set_item("proximity_pairs", report.proximity_pairs)?;
+        row.set_item("contacts", report.mechanics.contacts)?;
+        row.set_item("self_contacts", report.mechanics.self_contacts)?;
+        row.set_item("penetrating_nodes", report.penetrating_nodes)?;
+        row.set_item("max_depth", report.max_depth)?;
+        row.set_item("newton_iterations", newton)?;
+        row.set_item("iterations", iterations)?;
+        row.set_item("residual", report.mechanics.residual)?;
+        Ok(row)
+    }
+
+    fn set_positions(
+        &self,
+        py: Python<'_>,
+        body: usize,
+        positions: PyReadonlyArray2<'_, f64>,
+    ) -> PyResult<()> {
+        raise(py, self.lock().set_positions(body, points(&positions, "positions")?))
+    }
+
+    fn set_velocities(
+        &self,
+        py: Python<'_>,
+        body: usize,
+        velocities: PyReadonlyArray2<'_, f64>,
+    ) -> PyResult<()> {
+        raise(py, self.lock().set_velocities(body, points(&velocities, "velocities")?))
+    }
+
+    fn set_forces(
+        &self,
+        py: Python<'_>,
+        body: usize,
+        forces: PyReadonlyArray2<'_, f64>,
+    ) -> PyResult<()> {
+        raise(py, self.lock().set_forces(body, points(&forces, "forces")?))
+    }
+
+    fn intersections<'py>(
+        &self,
+        py: Python<'py>,
+        self_contact: bool,
+    ) -> PyResult<(Bound<'py, PyArray2<i32>>, StatsRow)> {
+        let options = IntersectionOptions { self_contact, same_leaf: true };
+        let found = py.detach(|| {
+            let mut guard = self.lock();
+            let scene = guard.scene()?;
+            let found = scene.intersections(&options);
+            let row = |pair: &palpate::contact::TrianglePair| {
+                [pair.body_a, pair.triangle_a, pair.body_b, pair.triangle_b]
+            };
+            let rows: Vec<_> = found.pairs.iter().map(row).collect();
+            Ok::<_, palpate::SimulationError>((rows, stats_row(&found.stats)))
+        });
+        let (rows, stats) = raise(py, found)?;
+        Ok((index_matrix(py, &rows)?, stats))
+    }
+
+    fn energy<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let energy = self.lock().dynamics().energy();
+        let row = PyDict::new(py);
+        row.set_item("kinetic", energy.kinetic)?;
+        row.set_item("elastic", energy.elastic)?;
+        row.set_item("gravitational", energy.gravitational)?;
+        Ok(row)
+    }
+
+    fn snapshot(&self) -> PySnapshot {
+        PySnapshot { state: self.lock().snapshot() }
+    }
+
+    fn restore(&self, py: Python<'_>, snapshot: &PySnapshot) -> PyResult<()> {
+        raise(py, self.lock().restore(&snapshot.state))
+    }
+
+    fn reset(&self, py: Python<'_>) -> PyResult<()> {
+        raise(py, self.lock().reset())
+    }
+
+    fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        raise(py, py.detach(|| self.lock().save(&path)))
+    }
+
+    #[staticmethod]
+    fn load(py: Python<'_>, path: PathBuf, threads: usize) -> PyResult<Self> {
+        let simulation = raise(py, py.detach(|| Simulation::load(&path, threads)))?;
+        Ok(Self { simulation: Mutex::new(simulation) })
+    }
+}
