@@ -6,4 +6,7 @@ pub mod mesh;
 pub use body::{
     Appearance, Body, ContactSettings, Law, Material, Model, Pose, RigidKey, RigidMotion, Structure,
 };
-pub use mesh::{Mesh, MeshData, MeshError};
+pub use mesh::{
+    Defect, DefectKind, ElementKind, Indices, Mesh, MeshData, MeshError, NONE, NodeTriangles,
+    QualitySummary, RepairReport, TETRAHEDRON_FACES,
+};

@@ -1,10 +1,25 @@
 //! The mesh of one body: nodes, tetrahedra and the surface triangles found from them.
 
+mod adjacency;
+mod check;
+mod defects;
+mod error;
+mod measure;
 mod surface;
 
 use std::collections::BTreeMap;
 
 use palpate_geometry::{Aabb, Point};
+
+pub use adjacency::NodeTriangles;
+pub use check::RepairReport;
+pub use defects::{Defect, DefectKind};
+pub use error::{ElementKind, Indices, MeshError};
+pub use measure::QualitySummary;
+pub use surface::TETRAHEDRON_FACES;
+
+pub(crate) use check::drop_unused_nodes;
+pub(crate) use error::Place;
 
 /// Marks "no tetrahedron" or "no triangle" in index arrays.
 pub const NONE: u32 = u32::MAX;
@@ -19,22 +34,14 @@ pub struct MeshData {
     /// Triangles of a surface-only mesh, shape (t, 3). Must be empty when there are tetrahedra:
     /// their surface is extracted.
     pub triangles: Vec<[u32; 3]>,
-    /// Named node sets: sorted node indices without repetition.
+    /// Named node sets: sorted node indices without repetition ([`Mesh::new`] sorts them).
     pub node_sets: BTreeMap<String, Vec<u32>>,
     /// Region number of each tetrahedron, shape (m,), or empty.
     pub regions: Vec<i32>,
 }
 
-/// Why arrays do not make a mesh.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum MeshError {
-    /// A mesh without elements.
-    #[error("the mesh has neither tetrahedra nor triangles")]
-    Empty,
-}
-
-/// A checked mesh: finite nodes, indices in range, every tetrahedron positively oriented.
+/// A checked mesh: finite nodes, indices in range, every tetrahedron positively oriented, no element
+/// twice.
 ///
 /// With tetrahedra, the surface is every face that belongs to exactly one of them, outward; without,
 /// the given triangles are the surface (membrane, cloth, rigid tool).
@@ -51,22 +58,81 @@ impl Mesh {
     /// Checks `data` and extracts the surface.
     ///
     /// # Errors
-    /// If the arrays do not describe a mesh; the error names the index and the fix.
-    pub fn new(data: MeshData) -> Result<Self, MeshError> {
-        if data.tetrahedra.is_empty() && data.triangles.is_empty() {
-            return Err(MeshError::Empty);
-        }
+    /// If the arrays do not describe a mesh; the error names the index and the fix. Inverted, flat
+    /// and repeated elements are refused: [`Mesh::repaired`] mends them.
+    pub fn new(mut data: MeshData) -> Result<Self, MeshError> {
+        check::check_arrays(&mut data)?;
+        check::check_orientations(&data.nodes, &data.tetrahedra)?;
+        check::check_duplicates(&data)?;
         Ok(Self::from_checked(data))
+    }
+
+    /// Like [`Mesh::new`], but re-orients inverted tetrahedra and drops flat tetrahedra, repeated
+    /// elements and unused nodes; node sets and regions follow.
+    ///
+    /// # Errors
+    /// If the arrays have a fault that cannot be mended without guessing.
+    pub fn repaired(mut data: MeshData) -> Result<(Self, RepairReport), MeshError> {
+        check::check_arrays(&mut data)?;
+        let report = check::repair(&mut data)?;
+        Ok((Self::from_checked(data), report))
     }
 
     fn from_checked(mut data: MeshData) -> Self {
         let mut triangle_owners = Vec::new();
         if !data.tetrahedra.is_empty() {
-            (data.triangles, triangle_owners) = surface::boundary_faces(&data.tetrahedra);
+            (data.triangles, triangle_owners) =
+                surface::boundary_faces(&data.tetrahedra, data.nodes.len());
         }
         let surface_nodes = surface::used_nodes(&data.triangles, data.nodes.len());
         let (surface_edges, triangle_edges) = surface::edges(&data.triangles);
         Self { data, triangle_owners, surface_nodes, surface_edges, triangle_edges }
+    }
+
+    /// The same elements with other node positions [m], shape (n, 3).
+    ///
+    /// # Errors
+    /// If the number of positions is wrong, or one is not finite, or a tetrahedron is no longer
+    /// positive.
+    pub fn with_nodes(&self, nodes: Vec<Point>) -> Result<Self, MeshError> {
+        if nodes.len() != self.data.nodes.len() {
+            return Err(MeshError::NodeCount {
+                found: nodes.len(),
+                expected: self.data.nodes.len(),
+            });
+        }
+        check::check_finite(&nodes)?;
+        check::check_orientations(&nodes, &self.data.tetrahedra)?;
+        let mut moved = self.clone();
+        moved.data.nodes = nodes;
+        Ok(moved)
+    }
+
+    /// The image under `map`, which must be affine; `mirrored` says that it turns the inside out
+    /// (negative determinant), so that two nodes of each element are swapped.
+    ///
+    /// # Errors
+    /// As [`Mesh::with_nodes`]: a map that is nearly singular flattens tetrahedra.
+    pub fn mapped(&self, map: impl Fn(Point) -> Point, mirrored: bool) -> Result<Self, MeshError> {
+        let nodes: Vec<Point> = self.data.nodes.iter().map(|&point| map(point)).collect();
+        if !mirrored {
+            return self.with_nodes(nodes);
+        }
+        let mut data = self.clone().into_data();
+        data.nodes = nodes;
+        data.tetrahedra.iter_mut().for_each(|tetrahedron| tetrahedron.swap(2, 3));
+        data.triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
+        check::check_finite(&data.nodes)?;
+        check::check_orientations(&data.nodes, &data.tetrahedra)?;
+        Ok(Self::from_checked(data))
+    }
+
+    /// The arrays that make this mesh; the triangles of a tetrahedral mesh are left out.
+    pub fn into_data(mut self) -> MeshData {
+        if !self.data.tetrahedra.is_empty() {
+            self.data.triangles = Vec::new();
+        }
+        self.data
     }
 
     /// Node positions [m], shape (n, 3).
@@ -88,6 +154,11 @@ impl Mesh {
     /// The tetrahedron that owns each surface triangle, shape (t,); empty for a surface-only mesh.
     pub fn triangle_owners(&self) -> &[u32] {
         &self.triangle_owners
+    }
+
+    /// True when the mesh has triangles only.
+    pub fn is_surface_only(&self) -> bool {
+        self.data.tetrahedra.is_empty()
     }
 
     /// Sorted indices of the nodes that some surface triangle uses.

@@ -1,30 +1,81 @@
 //! The surface of a tetrahedral mesh: faces of exactly one tetrahedron, and their edges.
 
-/// Faces of the tetrahedron (a, b, c, d), outward when its volume is positive.
-const FACES: [[usize; 3]; 4] = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
+/// Faces of the tetrahedron (a, b, c, d), outward when its volume is positive: face `k` is opposite
+/// to node `3 - k`.
+pub const TETRAHEDRON_FACES: [[usize; 3]; 4] = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
+
+/// Calls `visit` once for every distinct face, with all its occurrences as `4 * tetrahedron + face`
+/// in rising order.
+///
+/// Faces are bucketed by their smallest node, so that millions of tetrahedra need one 4-byte entry
+/// per face beside their own array. O(m) for bounded node degree.
+pub(super) fn for_each_face(
+    tetrahedra: &[[u32; 4]],
+    node_count: usize,
+    mut visit: impl FnMut(&[u32]),
+) {
+    let (offsets, faces) = bucket_by_smallest_node(tetrahedra, node_count);
+    let mut keyed: Vec<([u32; 2], u32)> = Vec::new();
+    let mut same: Vec<u32> = Vec::new();
+    for bucket in offsets.windows(2) {
+        keyed.clear();
+        keyed.extend(faces[bucket[0] as usize..bucket[1] as usize].iter().map(|&face| {
+            let [_, middle, largest] = sorted_face(tetrahedra, face);
+            ([middle, largest], face)
+        }));
+        keyed.sort_unstable();
+        for run in keyed.chunk_by(|left, right| left.0 == right.0) {
+            same.clear();
+            same.extend(run.iter().map(|(_, face)| face));
+            visit(&same);
+        }
+    }
+}
+
+/// Counting sort of all faces by their smallest node.
+fn bucket_by_smallest_node(tetrahedra: &[[u32; 4]], node_count: usize) -> (Vec<u32>, Vec<u32>) {
+    let mut offsets = vec![0_u32; node_count + 1];
+    let all_faces = || 0..4 * tetrahedra.len() as u32;
+    for face in all_faces() {
+        offsets[sorted_face(tetrahedra, face)[0] as usize] += 1;
+    }
+    let mut total = 0;
+    for offset in &mut offsets {
+        total += *offset;
+        *offset = total;
+    }
+    let mut faces = vec![0; 4 * tetrahedra.len()];
+    for face in all_faces().rev() {
+        let slot = &mut offsets[sorted_face(tetrahedra, face)[0] as usize];
+        *slot -= 1;
+        faces[*slot as usize] = face;
+    }
+    (offsets, faces)
+}
+
+fn sorted_face(tetrahedra: &[[u32; 4]], face: u32) -> [u32; 3] {
+    let mut key = face_nodes(tetrahedra, face);
+    key.sort_unstable();
+    key
+}
+
+fn face_nodes(tetrahedra: &[[u32; 4]], face: u32) -> [u32; 3] {
+    TETRAHEDRON_FACES[face as usize % 4].map(|corner| tetrahedra[face as usize / 4][corner])
+}
 
 /// Faces that belong to exactly one tetrahedron, outward, with their owners, in tetrahedron order.
-pub(super) fn boundary_faces(tetrahedra: &[[u32; 4]]) -> (Vec<[u32; 3]>, Vec<u32>) {
-    let mut faces: Vec<([u32; 3], u32)> = Vec::with_capacity(4 * tetrahedra.len());
-    for (tetrahedron, nodes) in tetrahedra.iter().enumerate() {
-        for (side, corners) in FACES.iter().enumerate() {
-            let mut key = corners.map(|corner| nodes[corner]);
-            key.sort_unstable();
-            faces.push((key, (4 * tetrahedron + side) as u32));
-        }
-    }
-    faces.sort_unstable();
+pub(super) fn boundary_faces(
+    tetrahedra: &[[u32; 4]],
+    node_count: usize,
+) -> (Vec<[u32; 3]>, Vec<u32>) {
     let mut boundary: Vec<u32> = Vec::new();
-    for run in faces.chunk_by(|left, right| left.0 == right.0) {
-        if let [(_, face)] = run {
+    for_each_face(tetrahedra, node_count, |occurrences| {
+        if let [face] = occurrences {
             boundary.push(*face);
         }
-    }
+    });
     boundary.sort_unstable();
-    let triangles = boundary
-        .iter()
-        .map(|&face| FACES[face as usize % 4].map(|corner| tetrahedra[face as usize / 4][corner]))
-        .collect();
+    let triangles = boundary.iter().map(|&face| face_nodes(tetrahedra, face)).collect();
     (triangles, boundary.iter().map(|&face| face / 4).collect())
 }
 
@@ -49,6 +100,7 @@ pub(super) fn edges(triangles: &[[u32; 3]]) -> (Vec<[u32; 2]>, Vec<[u32; 3]>) {
         .collect();
     unique.sort_unstable();
     unique.dedup();
+    unique.shrink_to_fit();
     let index =
         |edge: [u32; 2]| unique.binary_search(&edge).expect("every edge was collected") as u32;
     let of_triangle = triangles
@@ -56,4 +108,49 @@ pub(super) fn edges(triangles: &[[u32; 3]]) -> (Vec<[u32; 2]>, Vec<[u32; 3]>) {
         .map(|triangle| std::array::from_fn(|side| index(edge_of(triangle, side))))
         .collect();
     (unique, of_triangle)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+
+    use proptest::prelude::*;
+
+    use super::*;
+
+    /// The obvious extraction: every face against every other.
+    fn boundary_by_map(tetrahedra: &[[u32; 4]]) -> (Vec<[u32; 3]>, Vec<u32>) {
+        let mut occurrences: BTreeMap<[u32; 3], usize> = BTreeMap::new();
+        let faces = || {
+            tetrahedra.iter().enumerate().flat_map(|(owner, nodes)| {
+                TETRAHEDRON_FACES.map(|corners| (corners.map(|corner| nodes[corner]), owner))
+            })
+        };
+        let key = |face: [u32; 3]| {
+            let mut sorted = face;
+            sorted.sort_unstable();
+            sorted
+        };
+        for (face, _) in faces() {
+            *occurrences.entry(key(face)).or_default() += 1;
+        }
+        faces()
+            .filter(|(face, _)| occurrences[&key(*face)] == 1)
+            .map(|(face, owner)| (face, owner as u32))
+            .unzip()
+    }
+
+    proptest! {
+        #[test]
+        fn bucketed_extraction_agrees_with_a_map_of_all_faces(
+            tetrahedra in proptest::collection::vec(
+                proptest::sample::subsequence((0_u32..12).collect::<Vec<_>>(), 4).prop_shuffle(),
+                0..60,
+            ),
+        ) {
+            let tetrahedra: Vec<[u32; 4]> =
+                tetrahedra.iter().map(|nodes| nodes.as_slice().try_into().unwrap()).collect();
+            prop_assert_eq!(boundary_faces(&tetrahedra, 12), boundary_by_map(&tetrahedra));
+        }
+    }
 }
