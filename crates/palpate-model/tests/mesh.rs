@@ -96,7 +96,16 @@ fn what_no_repair_can_mend_is_refused_by_both() {
             format!("{name}: {repaired}")
         })
         .collect();
-    assert_snapshot!(text.join("\n"), @"");
+    assert_snapshot!(text.join("\n"), @r"
+    empty: the mesh has neither tetrahedra nor triangles
+    not finite: node 2: position (0, NaN, 0) is not finite
+    out of range: tetrahedron 1: node index 99 is out of range (the mesh has 4 nodes)
+    one too far: tetrahedron 0: node index 4 is out of range (the mesh has 4 nodes, counted from 0)
+    repeated node: tetrahedron 1: node 1 is named twice
+    set out of range: set `hilum`: node index 7 is out of range (the mesh has 4 nodes)
+    regions: 2 region numbers for 1 tetrahedra; give one for each, or none
+    both kinds: the mesh has both tetrahedra and triangles; leave the triangles out, the surface of the tetrahedra is found from them
+    ");
 }
 
 #[test]
@@ -105,7 +114,7 @@ fn inverted_flat_and_repeated_tetrahedra_are_refused_and_repaired() {
     let sound = data.clone();
     data.regions = (0..data.tetrahedra.len() as i32).collect();
     data.tetrahedra[3].swap(0, 1);
-    assert_snapshot!(refusal(data.clone()), @"");
+    assert_snapshot!(refusal(data.clone()), @"1 tetrahedron is inverted (negative volume): 3; repair re-orients them");
 
     let flat = data.nodes.len() as u32;
     data.nodes.extend([[9.0; 3], [0.25, 0.25, 0.0]]);
@@ -122,7 +131,7 @@ fn inverted_flat_and_repeated_tetrahedra_are_refused_and_repaired() {
     data.node_sets.insert("some".into(), vec![flat + 1, flat, 2, 1, 1]);
 
     let (mesh, report) = Mesh::repaired(data).unwrap();
-    assert_snapshot!(report.to_string(), @"");
+    assert_snapshot!(report.to_string(), @"re-oriented 1 inverted tetrahedron: 4; dropped 1 flat tetrahedron: 0; dropped 1 repeated element: 13; dropped 2 unused nodes: 12, 13");
     assert_eq!(mesh.nodes(), sound.nodes);
     assert_eq!(mesh.tetrahedra().len(), sound.tetrahedra.len());
     assert_eq!(mesh.regions(), (0..sound.tetrahedra.len() as i32).collect::<Vec<_>>());
@@ -136,15 +145,15 @@ fn inverted_flat_and_repeated_tetrahedra_are_refused_and_repaired() {
 fn strict_refusals_name_the_first_few_and_the_count() {
     let mut data = box_data([5, 1, 1], [1.0; 3]);
     data.tetrahedra.iter_mut().for_each(|tetrahedron| tetrahedron.swap(1, 2));
-    assert_snapshot!(refusal(data), @"");
+    assert_snapshot!(refusal(data), @"30 tetrahedra are inverted (negative volume): 0, 1, 2, 3, 4, 5, 6, 7, ...; repair re-orients them");
     let mut data = corner();
     data.nodes[3] = [0.5, 0.5, 0.0];
-    assert_snapshot!(refusal(data.clone()), @"");
-    assert_snapshot!(Mesh::repaired(data).unwrap_err(), @"");
+    assert_snapshot!(refusal(data.clone()), @"1 tetrahedron is flat (zero volume): 0; repair drops them");
+    assert_snapshot!(Mesh::repaired(data).unwrap_err(), @"no tetrahedron is left after repair: all 1 were flat or repeated");
     let mut data = corner();
     data.tetrahedra.push([1, 2, 0, 3]);
-    assert_snapshot!(refusal(data), @"");
-    assert_snapshot!(refusal(surface(&CORNER, &[[0, 1, 2], [0, 1, 3], [2, 1, 0]])), @"");
+    assert_snapshot!(refusal(data), @"1 tetrahedron has the same four nodes as an earlier one: 1; repair drops them");
+    assert_snapshot!(refusal(surface(&CORNER, &[[0, 1, 2], [0, 1, 3], [2, 1, 0]])), @"1 triangle has the same three nodes as an earlier one: 2; repair drops them");
 }
 
 #[test]
@@ -200,7 +209,21 @@ fn suspicious_meshes_are_described() {
     describe("open", surface(&CORNER, &[[0, 1, 2]]));
     describe("opposite", surface(&CORNER, &[[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 3, 2]]));
     describe("line", surface(&[[0.0; 3], [1.0; 3], [2.0; 3]], &[[0, 1, 2]]));
-    assert_snapshot!(text.join("\n"), @"");
+    assert_snapshot!(text.join("\n"), @r"
+    unused: 2 nodes of no element (4, 5); repair drops them
+    unused: 1 node lies on another one (5); merge them if the parts are meant to hang together
+    by an edge: 1 edge of more than two surface triangles (surface edges: 2); parts hang together by an edge only: separate or fill them
+    by a point: 1 node where surfaces meet in a point (0); parts hang together by a point only: separate or fill them
+    apart: the mesh falls into 2 parts (first nodes: 0, 4); make each a body of its own if they should move on their own
+    crowded: 3 tetrahedra share a face with two others (0, 1, 2); tetrahedra overlap there: mesh it anew
+    crowded: 3 edges of more than two surface triangles (surface edges: 0, 1, 5); parts hang together by an edge only: separate or fill them
+    sliver: 1 nearly flat tetrahedron (0); they stiffen the body and slow the solver: improve the mesh
+    open: 1 node of no element (3); repair drops them
+    open: 3 open edges (surface edges: 0, 1, 2); a membrane may have them; a body with an inside must be closed
+    opposite: 3 edges between triangles that face opposite ways (surface edges: 3, 4, 5); orient the surface: its outside is where triangles are seen counter-clockwise
+    line: 1 surface triangle without area (0); they have no normal: collapse them
+    line: 3 open edges (surface edges: 0, 1, 2); a membrane may have them; a body with an inside must be closed
+    ");
 }
 
 #[test]
