@@ -1,0 +1,37 @@
+"""Dependencies among the crates point one way."""
+
+import re
+from pathlib import Path
+
+ROOT = Path(__file__).parent.parent
+
+#: What each crate may use of ours.
+ALLOWED = {
+    "palpate-geometry": set(),
+    "palpate-model": {"palpate-geometry"},
+    "palpate-contact": {"palpate-geometry", "palpate-model"},
+    "palpate-solver": set(),
+    "palpate-mechanics": {
+        "palpate-geometry", "palpate-model", "palpate-contact", "palpate-solver",
+    },
+    "palpate": {"palpate-geometry", "palpate-model", "palpate-contact", "palpate-mechanics"},
+    "palpate-python": {"palpate"},
+}
+
+
+def test_crates_depend_one_way():
+    for crate, allowed in ALLOWED.items():
+        manifest = (ROOT / "crates" / crate / "Cargo.toml").read_text()
+        section = manifest.split("[dependencies]")[1].split("\n[")[0]
+        used = set(re.findall(r"^(palpate[a-z-]*)\b", section, re.MULTILINE))
+        assert used <= allowed, crate
+
+
+def test_every_crate_is_listed():
+    assert {path.name for path in (ROOT / "crates").iterdir()} == set(ALLOWED)
+
+
+def test_unsafe_stays_out():
+    for source in (ROOT / "crates").glob("*/src/**/*.rs"):
+        code = re.sub(r"//.*", "", source.read_text())
+        assert not re.search(r"\bunsafe\b", code) or source.name == "simd.rs", source

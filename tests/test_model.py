@@ -1,0 +1,153 @@
+"""Models: from text and from Python."""
+
+import numpy as np
+import pytest
+from conftest import CUBE_NODES, CUBE_TETRAHEDRA
+
+import palpate
+
+PAPER = """\
+BRANCH{
+  ME{ trans 0,0,0  rot 1,0,0,0  scale 1,1,1 }
+  TREE{
+    ME{ trans 2,0,0  rot 1,0,0,0  scale 1,1,2 }
+    PE 1
+    NE kidney.seg
+  }
+  TREE{
+    ME{ trans 0,-2.5,-1.4  rot 1,0,0,0  scale 1,1,2 }
+    PE 2
+    NE aorta.seg
+  }
+}
+"""
+
+
+@pytest.fixture
+def write_model(tmp_path, cube):
+    palpate.write_mesh(tmp_path / "kidney.seg", cube)
+    palpate.write_mesh(tmp_path / "aorta.seg", cube)
+
+    def write(text):
+        path = tmp_path / "model.bml"
+        path.write_text(text)
+        return path
+
+    return write
+
+
+def test_the_papers_sample_loads(write_model):
+    model = palpate.read_model(write_model(PAPER))
+    kidney, aorta = model.bodies
+    assert (kidney.name, aorta.name) == ("kidney", "aorta")
+    assert (kidney.processor, aorta.processor) == (1, 2)
+    assert np.allclose(kidney.mesh.nodes, CUBE_NODES * [1, 1, 2] + [2, 0, 0])
+    assert np.allclose(aorta.mesh.nodes, CUBE_NODES * [1, 1, 2] + [0, -2.5, -1.4])
+    assert kidney.rigid is None
+    assert kidney.material == palpate.Material()
+    assert model.tree.kind == "CE"
+    assert [child.body for child in model.tree.children] == [0, 1]
+
+
+def test_text_round_trips(write_model):
+    model = palpate.read_model(write_model(PAPER))
+    again = palpate.read_model(write_model(model.to_text()))
+    assert again.to_text() == model.to_text()
+    assert [body.mesh for body in again.bodies] == [body.mesh for body in model.bodies]
+
+
+def test_extensions_arrive_in_python(write_model):
+    model = palpate.read_model(write_model("""
+        gravity 0,0,-1
+        TREE left {
+          NE kidney.seg
+          MT { young 1e4 poisson 0.3 density 900 damping 0.02 mass_damping 0.5 }
+          CN { friction 0.4 distance 0.01 stiffness 1e6 self off }
+          FX { box -1,-1,-1 2,2,0.5 }
+          VE { color 0.1,0.2,0.3 opacity 0.5 }
+          IV 1,2,3
+          RG { at 0 trans 0,0,0  at 1 trans 0,0,0.5 rot axis 0,0,1 angle 90 }
+        }
+    """))
+    (body,) = model.bodies
+    assert model.gravity == (0.0, 0.0, -1.0)
+    assert body.name == "left"
+    assert body.material == palpate.Material("linear", 1e4, 0.3, 900.0, 0.02, 0.5)
+    assert body.contact == palpate.Contact(0.4, 0.01, 1e6, False)
+    assert body.fixed_nodes.tolist() == [0, 2, 4, 6]
+    assert body.color == (0.1, 0.2, 0.3)
+    assert body.opacity == 0.5
+    assert body.initial_velocity == (1.0, 2.0, 3.0)
+    assert [key.time for key in body.rigid] == [0.0, 1.0]
+    assert np.allclose(body.rigid[1].rotation, [np.sqrt(0.5), 0, 0, np.sqrt(0.5)])
+
+
+def test_a_model_error_has_its_place(write_model):
+    path = write_model("TREE {\n  PEE 1\n  NE kidney.seg\n}\n")
+    with pytest.raises(palpate.ModelError) as caught:
+        palpate.read_model(path)
+    error = caught.value
+    assert (error.path, error.line, error.column) == (str(path), 2, 3)
+    assert "PEE" in str(error)
+    assert "^" in str(error)
+    assert "PE" in error.diagnostics[0].hint
+
+
+def test_a_missing_mesh_is_an_error_at_its_name(write_model):
+    path = write_model("TREE {\n  NE liver.seg\n}\n")
+    with pytest.raises(palpate.ModelError, match=r"liver\.seg") as caught:
+        palpate.read_model(path)
+    assert (caught.value.line, caught.value.column) == (2, 6)
+
+
+def test_ne_reads_formats_that_only_python_knows(write_model, tmp_path, cube):
+    pytest.importorskip("meshio")
+    palpate.write_mesh(tmp_path / "cube.vtu", cube)
+    model = palpate.read_model(write_model("TREE { NE cube.vtu }"))
+    assert np.array_equal(model.bodies[0].mesh.tetrahedra, cube.tetrahedra)
+
+
+def test_a_missing_model_lists_the_bundled_ones(tmp_path):
+    with pytest.raises(FileNotFoundError, match="case1"):
+        palpate.read_model(tmp_path / "nothing.bml")
+
+
+@pytest.mark.parametrize("name", ["small", "case1", "case2"])
+def test_bundled_models_load_and_round_trip(name, tmp_path):
+    model = palpate.read_model(name)
+    assert len(model.bodies) >= 2
+    assert all(body.mesh.volume > 0 or body.rigid is not None for body in model.bodies)
+
+
+def test_a_model_from_arrays(cube):
+    floor = palpate.Mesh([[-5, -5, -1], [5, -5, -1], [5, 5, -1], [-5, 5, -1]],
+                         triangles=[[0, 1, 2], [0, 2, 3]])
+    model = palpate.Model(
+        [cube, palpate.Body(floor, name="floor", rigid=()), cube], gravity=(0, 0, -2)
+    )
+    assert [body.name for body in model.bodies] == ["body_1", "floor", "body_3"]
+    assert model.bodies[1].rigid == ()
+    with pytest.raises(ValueError, match="made from arrays"):
+        model.to_text()
+
+
+@pytest.mark.parametrize(("body", "text"), [
+    ({"material": palpate.Material(poisson=0.5)}, "poisson"),
+    ({"material": palpate.Material(young=-1.0)}, "young"),
+    ({"material": palpate.Material(density=float("nan"))}, "density"),
+    ({"material": palpate.Material(law="rubber")}, "rubber"),
+    ({"contact": palpate.Contact(friction=-1.0)}, "friction"),
+    ({"contact": palpate.Contact(distance=0.0)}, "distance"),
+    ({"fixed_nodes": [8]}, "fixed"),
+    ({"fixed_nodes": [-1]}, "fixed_nodes"),
+    ({"opacity": 2.0}, "opacity"),
+    ({"rigid": [palpate.RigidKey(1.0), palpate.RigidKey(1.0)]}, "time"),
+    ({"initial_velocity": (0, 0)}, "initial_velocity"),
+])
+def test_bad_bodies_are_refused_by_name(cube, body, text):
+    with pytest.raises(ValueError, match=text):
+        palpate.Model([palpate.Body(cube, name="left", **body)])
+
+
+def test_cube_in_fixture_is_what_the_tests_say(cube):
+    assert np.array_equal(cube.tetrahedra, CUBE_TETRAHEDRA)

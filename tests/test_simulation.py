@@ -1,0 +1,173 @@
+"""Simulation from Python: stepping, state, bits, physics that can be computed by hand."""
+
+import numpy as np
+import pytest
+
+import palpate
+
+
+@pytest.fixture
+def falling(make_box):
+    """A soft box above a rigid plate."""
+    soft = palpate.Body(make_box((3, 3, 3), size=0.1, origin=(0, 0, 0.004)), name="soft")
+    plate = palpate.Body(
+        palpate.Mesh([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]],
+                     triangles=[[0, 1, 2], [0, 2, 3]]),
+        name="plate",
+        rigid=(),
+    )
+    return palpate.Model([soft, plate])
+
+
+def test_free_fall(make_box):
+    simulation = palpate.Simulation([make_box((2, 2, 2), size=0.1)], time_step=0.01)
+    start = simulation.positions[0]
+    simulation.step(10)
+    # Implicit Euler: v_n = -g n dt, x_n = x_0 - g dt^2 n (n + 1) / 2.
+    drop = -9.81 * 0.01**2 * 10 * 11 / 2
+    assert np.allclose(simulation.positions[0] - start, [0, 0, drop], atol=1e-12)
+    assert np.allclose(simulation.velocities[0], [0, 0, -9.81 * 0.1], atol=1e-10)
+    assert simulation.time == pytest.approx(0.1)
+
+
+def test_a_box_comes_to_rest_and_the_plate_carries_its_weight(falling):
+    simulation = palpate.Simulation(falling)
+    report = simulation.step(240)
+    assert report.contacts > 0
+    weight = 1000 * 0.1**3 * 9.81
+    soft, plate = simulation.contact_forces
+    assert soft.sum(axis=0) == pytest.approx([0, 0, weight], rel=0.01, abs=0.01 * weight)
+    assert np.abs(soft.sum(axis=0) + plate.sum(axis=0)).max() < 1e-12 * weight * 100
+    assert np.abs(simulation.velocities[0]).max() < 1e-3
+    assert simulation.positions[0][:, 2].min() > 0
+    contacts = simulation.contacts
+    assert len(contacts) == report.contacts
+    assert contacts.forces.sum(axis=0)[2] == pytest.approx(weight, rel=0.01)
+    assert set(report.times) == {"update", "penetration", "proximity", "mechanics", "total"}
+
+
+def test_arrays_handed_out_never_change(falling):
+    simulation = palpate.Simulation(falling)
+    positions = simulation.positions[0]
+    copy = positions.copy()
+    simulation.step(3)
+    assert np.array_equal(positions, copy)
+    assert not positions.flags.writeable
+
+
+def test_same_bits_at_any_thread_count(falling):
+    results = []
+    for threads in (1, 2, 5):
+        simulation = palpate.Simulation(falling, threads=threads)
+        simulation.step(40)
+        results.append(simulation.positions[0].tobytes())
+    assert len(set(results)) == 1
+
+
+def test_snapshot_restore_and_reset(falling):
+    simulation = palpate.Simulation(falling)
+    start = simulation.positions[0].tobytes()
+    simulation.step(20)
+    snapshot = simulation.snapshot()
+    simulation.step(15)
+    after = simulation.positions[0].tobytes()
+    simulation.restore(snapshot)
+    assert simulation.time == snapshot.time
+    simulation.step(15)
+    assert simulation.positions[0].tobytes() == after
+    simulation.reset()
+    assert simulation.positions[0].tobytes() == start
+    assert simulation.time == 0.0
+
+
+def test_checkpoints_continue_bit_for_bit(falling, tmp_path):
+    path = tmp_path / "run.palpate"
+    simulation = palpate.Simulation(falling)
+    simulation.step(20)
+    simulation.save(path)
+    simulation.step(15)
+    loaded = palpate.Simulation.load(path, threads=2)
+    loaded.step(15)
+    assert loaded.positions[0].tobytes() == simulation.positions[0].tobytes()
+    assert [body.name for body in loaded.model.bodies] == ["soft", "plate"]
+    assert [each.name for each in tmp_path.iterdir()] == ["run.palpate"]
+
+
+def test_damaged_checkpoints_are_refused(falling, tmp_path):
+    path = tmp_path / "run.palpate"
+    palpate.Simulation(falling).save(path)
+    whole = path.read_bytes()
+    for broken in (b"", b"hello", whole[:-1], whole[:20], whole + b"x",
+                   whole[:100] + bytes([whole[100] ^ 1]) + whole[101:]):
+        path.write_bytes(broken)
+        with pytest.raises(palpate.CheckpointError, match=r"run\.palpate"):
+            palpate.Simulation.load(path)
+    with pytest.raises(FileNotFoundError):
+        palpate.Simulation.load(tmp_path / "nothing.palpate")
+
+
+def test_forces_and_velocities_can_be_set(make_box):
+    simulation = palpate.Simulation(
+        palpate.Model([make_box((2, 2, 2), size=0.1)], gravity=(0, 0, 0)), time_step=0.01
+    )
+    count = len(simulation.positions[0])
+    simulation.set_velocities(0, np.tile([1.0, 0, 0], (count, 1)))
+    simulation.step()
+    assert np.allclose(simulation.velocities[0], [1, 0, 0])
+    simulation.set_forces("body_1", np.tile([0, 0, 1.0 / count], (count, 1)))
+    simulation.step()
+    momentum = simulation.velocities[0].mean(axis=0)
+    assert momentum[2] > 0
+    moved = simulation.positions[0] + [0, 1, 0]
+    simulation.set_positions(0, moved)
+    assert np.array_equal(simulation.positions[0], moved)
+
+
+@pytest.mark.parametrize(("values", "error"), [
+    (np.zeros((3, 3)), ValueError), (np.full((27, 3), np.nan), ValueError),
+    (np.zeros((27, 3), complex), TypeError), ("x", (TypeError, ValueError)),
+])
+def test_bad_values_change_nothing(make_box, values, error):
+    simulation = palpate.Simulation([make_box((2, 2, 2))])
+    before = simulation.positions[0]
+    for setter in (simulation.set_positions, simulation.set_velocities, simulation.set_forces):
+        with pytest.raises(error):
+            setter(0, values)
+    assert np.array_equal(simulation.positions[0], before)
+
+
+@pytest.mark.parametrize(("options", "error", "text"), [
+    ({"time_step": 0.0}, ValueError, "time_step"),
+    ({"time_step": float("nan")}, ValueError, "time_step"),
+    ({"time_step": "fast"}, TypeError, "time_step"),
+    ({"threads": 0}, ValueError, "threads"),
+    ({"method": "none"}, ValueError, "method"),
+])
+def test_bad_options_are_refused_by_name(cube, options, error, text):
+    with pytest.raises(error, match=text):
+        palpate.Simulation([cube], **options)
+
+
+def test_a_membrane_that_is_not_rigid_cannot_be_simulated():
+    sheet = palpate.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], triangles=[[0, 1, 2]])
+    with pytest.raises(palpate.SimulationError, match="sheet"):
+        palpate.Simulation([palpate.Body(sheet, name="sheet")])
+
+
+def test_steps_are_counted(cube):
+    simulation = palpate.Simulation([cube])
+    assert simulation.step(3).step == 3
+    with pytest.raises(ValueError, match="count"):
+        simulation.step(0)
+
+
+def test_two_soft_boxes_collide_and_keep_their_momentum(make_box):
+    left = palpate.Body(make_box((2, 2, 2), size=0.1), initial_velocity=(0.5, 0, 0), name="left")
+    right = palpate.Body(make_box((2, 2, 2), size=0.1, origin=(0.12, 0.02, 0.01)),
+                         initial_velocity=(-0.5, 0, 0), name="right")
+    simulation = palpate.Simulation(palpate.Model([left, right], gravity=(0, 0, 0)))
+    touched = sum(simulation.step().contacts > 0 for _ in range(60))
+    assert touched > 0
+    assert len(simulation.intersections()) == 0
+    gap = simulation.positions[1][:, 0].mean() - simulation.positions[0][:, 0].mean()
+    assert gap > 0.1
