@@ -86,8 +86,8 @@ impl Aabb {
     #[inline]
     pub fn distance_squared(&self, point: &Point) -> f64 {
         let mut sum = 0.0;
-        for axis in 0..3 {
-            let outside = (self.min[axis] - point[axis]).max(point[axis] - self.max[axis]).max(0.0);
+        for (axis, &value) in point.iter().enumerate() {
+            let outside = (self.min[axis] - value).max(value - self.max[axis]).max(0.0);
             sum += outside * outside;
         }
         sum

@@ -102,7 +102,7 @@ fn orient3d_exact(a: Point, b: Point, c: Point, d: Point) -> i8 {
     if d == a || d == b || d == c || flat(0) || flat(1) || flat(2) {
         return 0;
     }
-    if [a, b, c, d].as_flattened().iter().all(fits_expansion) {
+    if [a, b, c, d].as_flattened().iter().all(|&value| fits_expansion(value)) {
         let [a, b, c, d] = [a, b, c, d].map(|[x, y, z]| Coord3D { x, y, z });
         // `robust` is positive where `d` lies below the counter-clockwise plane.
         return -sign(robust::orient3d(a, b, c, d));
@@ -117,15 +117,15 @@ fn orient2d_exact(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> i8 {
     if a == b || b == c || c == a || flat(0) || flat(1) {
         return 0;
     }
-    if [a, b, c].as_flattened().iter().all(fits_expansion) {
+    if [a, b, c].as_flattened().iter().all(|&value| fits_expansion(value)) {
         let [a, b, c] = [a, b, c].map(|[x, y]| Coord { x, y });
         return sign(robust::orient2d(a, b, c));
     }
     exact::orient2d([a, b, c])
 }
 
-fn fits_expansion(value: &f64) -> bool {
-    *value == 0.0 || (EXPANSION_MIN..=EXPANSION_MAX).contains(&value.abs())
+fn fits_expansion(value: f64) -> bool {
+    value == 0.0 || (EXPANSION_MIN..=EXPANSION_MAX).contains(&value.abs())
 }
 
 fn sign(value: f64) -> i8 {

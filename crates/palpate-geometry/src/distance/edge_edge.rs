@@ -31,28 +31,34 @@ pub fn edge_edge(a: &[Point; 2], b: &[Point; 2]) -> EdgeEdge {
 
 /// The closest points of `w + s u` and `t v`.
 ///
-/// Ericson 2005, "Real-time collision detection", 5.1.9, but the free parameter comes from the part
-/// of `v` orthogonal to `u` (Gram-Schmidt) instead of the determinant `uu vv - uv²`, which is
-/// rounding noise for nearly parallel edges.
+/// Clamping as in Ericson 2005, "Real-time collision detection", 5.1.9, but the free parameter is a
+/// least-squares solution by modified Gram-Schmidt instead of a quotient with the determinant
+/// `u² v² - (u v)²`, which is rounding noise for nearly parallel edges.
 #[inline]
 fn closest(u: Point, v: Point, w: Point, uu: f64, vv: f64) -> EdgeEdge {
-    let mut t = 0.0;
-    if uu > 0.0 {
-        let across = vec3::add_scaled(v, u, -(vec3::dot(u, v) / uu));
-        let across_squared = vec3::norm_squared(across);
-        if across_squared > 0.0 {
-            t = (vec3::dot(w, across) / across_squared).clamp(0.0, 1.0);
-        }
+    if uu <= 0.0 {
+        let t = closest_parameter(w, v, vv);
+        return with_gap(u, v, w, 0.0, t);
     }
-    let s_free = if uu > 0.0 {
-        vec3::dot(vec3::add_scaled(vec3::scale(w, -1.0), v, t), u) / uu
-    } else {
-        0.0
-    };
-    let s = s_free.clamp(0.0, 1.0);
-    if s != s_free || uu <= 0.0 {
+    let inverse = 1.0 / uu;
+    let (v_along, w_along) = (vec3::dot(v, u) * inverse, vec3::dot(w, u) * inverse);
+    let v_across = vec3::add_scaled(v, u, -v_along);
+    let w_across = vec3::add_scaled(w, u, -w_along);
+    let across_squared = vec3::norm_squared(v_across);
+    let mut t = 0.0;
+    if across_squared > 0.0 {
+        t = (vec3::dot(w_across, v_across) / across_squared).clamp(0.0, 1.0);
+    }
+    let free = t * v_along - w_along;
+    let s = free.clamp(0.0, 1.0);
+    if s != free {
         t = closest_parameter(vec3::add_scaled(w, u, s), v, vv);
     }
+    with_gap(u, v, w, s, t)
+}
+
+#[inline]
+fn with_gap(u: Point, v: Point, w: Point, s: f64, t: f64) -> EdgeEdge {
     let gap = vec3::add_scaled(vec3::add_scaled(w, u, s), v, -t);
     EdgeEdge { distance_squared: vec3::norm_squared(gap), s, t }
 }

@@ -3,8 +3,8 @@
 use super::{MAX_SQUARE, MIN_SQUARE, closest_parameter, from_unit_scale, to_unit_scale};
 use crate::{Point, vec3};
 
-/// Below this square of (area / longest edge²) a triangle is a sliver: barycentric coordinates from
-/// the normal lose more than about five digits there.
+/// Below this square of (doubled area / longest edge²) a triangle is a sliver: the signs of its
+/// weights then say too little about which edges may be closest, and all are tried.
 const SLIVER: f64 = 1e-8;
 
 /// The part of a triangle that holds the closest point in its relative interior.
@@ -43,28 +43,58 @@ pub fn point_triangle(point: Point, triangle: &[Point; 3]) -> PointTriangle {
     {
         return rescaled(point, triangle);
     }
-    let normal = vec3::cross(edges[0], edges[1]);
-    if vec3::norm_squared(normal) < SLIVER * longest * longest {
-        return closest_in_sliver(offsets, edges, squares);
+    closest(offsets, edges, squares, longest)
+}
+
+#[inline]
+fn closest(
+    offsets: [Point; 3],
+    edges: [Point; 3],
+    squares: [f64; 3],
+    longest: f64,
+) -> PointTriangle {
+    let (weights, area_squared) = foot_on_plane(offsets, edges, squares);
+    let is_inside = weights.iter().all(|&weight| weight > 0.0);
+    let is_sliver = area_squared <= SLIVER * longest * longest;
+    if is_inside && !is_sliver {
+        return on_face(offsets, edges, weights);
     }
-    // Twice the signed area opposite to each corner, times the length of the normal.
-    let areas = [1, 2, 0].map(|i| vec3::dot(normal, vec3::cross(edges[i], offsets[i])));
-    if areas.iter().all(|&area| area > 0.0) {
-        let inverse = 1.0 / (areas[0] + areas[1] + areas[2]);
-        return on_face(offsets, edges, areas.map(|area| area * inverse));
-    }
-    // The closest point lies on an edge that has the point on its outer side.
     let mut best = PointTriangle {
         distance_squared: f64::INFINITY,
         weights: [1.0, 0.0, 0.0],
         feature: TriangleFeature::Vertex(0),
     };
+    // The closest point lies on an edge that has the point on its outer side.
     for edge in 0..3 {
-        if areas[(edge + 2) % 3] <= 0.0 {
+        if is_sliver || weights[(edge + 2) % 3] <= 0.0 {
             best = closer(best, on_edge(edge, offsets, edges, squares));
         }
     }
-    best
+    if is_inside { closer(best, on_face(offsets, edges, weights)) } else { best }
+}
+
+/// Weights of the point's foot on the triangle's plane, and the square of twice its area.
+///
+/// Least squares by modified Gram-Schmidt: along the first edge, then along what is orthogonal to
+/// it. The errors amount to moving the corners by ulps of the size, even where a thin triangle
+/// makes the weights themselves uncertain; the quotients of normals do not have that property.
+#[inline]
+fn foot_on_plane(offsets: [Point; 3], edges: [Point; 3], squares: [f64; 3]) -> ([f64; 3], f64) {
+    if squares[0] <= 0.0 {
+        return ([0.0; 3], 0.0);
+    }
+    let inverse = 1.0 / squares[0];
+    let apex_along = -vec3::dot(edges[2], edges[0]) * inverse;
+    let apex_across = vec3::add_scaled(vec3::scale(edges[2], -1.0), edges[0], -apex_along);
+    let along = vec3::dot(offsets[0], edges[0]) * inverse;
+    let across = vec3::add_scaled(offsets[0], edges[0], -along);
+    let across_squared = vec3::norm_squared(apex_across);
+    if across_squared <= 0.0 {
+        return ([0.0; 3], 0.0);
+    }
+    let c = vec3::dot(across, apex_across) / across_squared;
+    let b = along - c * apex_along;
+    ([1.0 - b - c, b, c], squares[0] * across_squared)
 }
 
 /// Edge `i` from corner `i` to corner `(i + 1) % 3`.
@@ -72,35 +102,6 @@ pub fn point_triangle(point: Point, triangle: &[Point; 3]) -> PointTriangle {
 fn edges(triangle: &[Point; 3]) -> [Point; 3] {
     let [a, b, c] = *triangle;
     [vec3::sub(b, a), vec3::sub(c, b), vec3::sub(a, c)]
-}
-
-/// All candidates: the three edges, and the face in coordinates along and across the longest edge
-/// (Gram-Schmidt), whose errors move the closest point by ulps even where the weights are poor.
-#[cold]
-#[inline(never)]
-fn closest_in_sliver(offsets: [Point; 3], edges: [Point; 3], squares: [f64; 3]) -> PointTriangle {
-    let mut best = on_edge(0, offsets, edges, squares);
-    for edge in 1..3 {
-        best = closer(best, on_edge(edge, offsets, edges, squares));
-    }
-    let longest = (0..3).fold(0, |best, i| if squares[i] > squares[best] { i } else { best });
-    let [i, j, k] = [longest, (longest + 1) % 3, (longest + 2) % 3];
-    if squares[i] > 0.0 {
-        let apex = vec3::scale(edges[k], -1.0);
-        let along = vec3::dot(apex, edges[i]) / squares[i];
-        let across = vec3::add_scaled(apex, edges[i], -along);
-        let across_squared = vec3::norm_squared(across);
-        if across_squared > 0.0 {
-            let height = vec3::dot(offsets[i], across) / across_squared;
-            let foot = vec3::dot(offsets[i], edges[i]) / squares[i] - height * along;
-            let mut weights = [0.0; 3];
-            (weights[i], weights[j], weights[k]) = (1.0 - foot - height, foot, height);
-            if weights.iter().all(|&weight| weight > 0.0) {
-                best = closer(best, on_face(offsets, edges, weights));
-            }
-        }
-    }
-    best
 }
 
 /// Degenerate triangles and extreme scales.
@@ -112,7 +113,10 @@ fn rescaled(point: Point, triangle: &[Point; 3]) -> PointTriangle {
     let triangle = [a, b, c];
     let offsets = triangle.map(|corner| vec3::sub(point, corner));
     let edges = edges(&triangle);
-    let found = closest_in_sliver(offsets, edges, edges.map(vec3::norm_squared));
+    let squares = edges.map(vec3::norm_squared);
+    // A triangle that is small beside its distance may have no normal squares even now: as a
+    // sliver, all of its features are tried.
+    let found = closest(offsets, edges, squares, 1.0);
     PointTriangle { distance_squared: from_unit_scale(found.distance_squared, exponent), ..found }
 }
 

@@ -1,0 +1,8 @@
+//! The crate against slow twins in exact integers, on input made to be nasty.
+
+mod distance;
+mod integers;
+mod intersection;
+mod oracle;
+mod predicates;
+mod strategies;
