@@ -72,10 +72,10 @@ def test_bodies_come_and_go(make_box, cube):
 
 
 def test_self_contact_can_be_left_out(make_box):
-    mesh = make_box((6, 1, 1), size=(6.0, 1.0, 1.0))
+    mesh = make_box((12, 1, 1), size=(6.0, 1.0, 1.0))
     nodes = mesh.nodes.copy()
     angle = nodes[:, 0] / 6.0 * 2 * np.pi * 1.05
-    radius = 1.0 + nodes[:, 1]
+    radius = 2.0 - nodes[:, 1]
     folded = np.column_stack([radius * np.cos(angle), radius * np.sin(angle), nodes[:, 2]])
     scene = palpate.Scene(mesh.with_nodes(folded))
     assert len(scene.intersections()) > 0

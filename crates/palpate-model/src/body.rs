@@ -5,11 +5,12 @@ use std::sync::Arc;
 
 use glam::{DMat3, DQuat, DVec3};
 use palpate_geometry::Point;
+use serde::{Deserialize, Serialize};
 
 use crate::mesh::Mesh;
 
 /// Everything a model file describes, loaded and placed.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Deserialize, Serialize)]
 pub struct Model {
     /// The bodies, in the order of their TREE blocks in the text.
     pub bodies: Vec<Body>,
@@ -20,7 +21,7 @@ pub struct Model {
 }
 
 /// The upper binary tree: connection elements (CE) down to the bodies (NE).
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize, Serialize)]
 pub enum Structure {
     /// A body, by its index in [`Model::bodies`].
     Body(usize),
@@ -29,7 +30,7 @@ pub enum Structure {
 }
 
 /// One object of the model: a mesh in its place, and how it behaves.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Deserialize, Serialize)]
 pub struct Body {
     /// Unique name: given after TREE, otherwise the mesh file's stem.
     pub name: String,
@@ -75,7 +76,7 @@ impl Body {
 }
 
 /// An affine map `x -> linear * x + translation`.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 pub struct Pose {
     /// Linear part: scale, then rotation, of every ME, inner first.
     pub linear: DMat3,
@@ -107,7 +108,7 @@ impl Pose {
 }
 
 /// Constitutive law of a material.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[non_exhaustive]
 pub enum Law {
     /// Linear elasticity in the body's own rotating frame.
@@ -116,7 +117,7 @@ pub enum Law {
 }
 
 /// Material of a body. The defaults are a generic soft organ.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 pub struct Material {
     /// Constitutive law.
     pub law: Law,
@@ -147,7 +148,7 @@ impl Default for Material {
 
 /// Contact parameters of a body. Between two bodies the mean of the distances, the harmonic mean of
 /// the stiffnesses and the geometric mean of the frictions count.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 pub struct ContactSettings {
     /// Coulomb friction coefficient.
     pub friction: f64,
@@ -166,7 +167,7 @@ impl Default for ContactSettings {
 }
 
 /// How a body is drawn.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 pub struct Appearance {
     /// Red, green, blue in 0..=1; `None`: chosen by the picture from the body's index.
     pub color: Option<[f64; 3]>,
@@ -182,7 +183,7 @@ impl Default for Appearance {
 
 /// Prescribed motion of a rigid body: key poses, interpolated; before the first and after the last
 /// the body rests there. No keys: the body is fixed.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
 pub struct RigidMotion {
     /// Keys with strictly increasing times.
     pub keys: Vec<RigidKey>,
@@ -191,7 +192,7 @@ pub struct RigidMotion {
 }
 
 /// A rigid body's pose at a time, relative to where the model placed it.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 pub struct RigidKey {
     /// Time [s].
     pub time: f64,

@@ -10,6 +10,7 @@ mod surface;
 use std::collections::BTreeMap;
 
 use palpate_geometry::{Aabb, Point};
+use serde::{Deserialize, Serialize, Serializer};
 
 pub use adjacency::NodeTriangles;
 pub use check::RepairReport;
@@ -25,7 +26,7 @@ pub(crate) use error::Place;
 pub const NONE: u32 = u32::MAX;
 
 /// What a file or a user gives: plain arrays, nothing checked.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
 pub struct MeshData {
     /// Node positions [m], shape (n, 3).
     pub nodes: Vec<Point>,
@@ -45,13 +46,28 @@ pub struct MeshData {
 ///
 /// With tetrahedra, the surface is every face that belongs to exactly one of them, outward; without,
 /// the given triangles are the surface (membrane, cloth, rigid tool).
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(try_from = "MeshData")]
 pub struct Mesh {
     data: MeshData,
     triangle_owners: Vec<u32>,
     surface_nodes: Vec<u32>,
     surface_edges: Vec<[u32; 2]>,
     triangle_edges: Vec<[u32; 3]>,
+}
+
+impl TryFrom<MeshData> for Mesh {
+    type Error = MeshError;
+
+    fn try_from(data: MeshData) -> Result<Self, MeshError> {
+        Self::new(data)
+    }
+}
+
+impl Serialize for Mesh {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        self.clone().into_data().serialize(serializer)
+    }
 }
 
 impl Mesh {

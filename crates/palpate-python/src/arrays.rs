@@ -1,8 +1,6 @@
 //! NumPy arrays in and out. What goes out is a copy and read-only, so it never changes later.
 
-use numpy::{
-    Element, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods,
-};
+use numpy::{Element, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods};
 use palpate::geometry::Point;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -39,7 +37,10 @@ pub(crate) fn index_vector<'py>(py: Python<'py>, indices: &[u32]) -> Bound<'py, 
 }
 
 /// The points of a C-contiguous float64 array of shape (n, 3), read in place.
-pub(crate) fn points<'a>(array: &'a PyReadonlyArray2<'_, f64>, name: &str) -> PyResult<&'a [Point]> {
+pub(crate) fn points<'a>(
+    array: &'a PyReadonlyArray2<'_, f64>,
+    name: &str,
+) -> PyResult<&'a [Point]> {
     rows::<f64, 3>(array, name)
 }
 
@@ -60,10 +61,7 @@ pub(crate) fn rows<'a, T: Element, const N: usize>(
 }
 
 /// Index rows as the core has them, or an error that names the element.
-pub(crate) fn indices<const N: usize>(
-    rows: &[[i64; N]],
-    name: &str,
-) -> PyResult<Vec<[u32; N]>> {
+pub(crate) fn indices<const N: usize>(rows: &[[i64; N]], name: &str) -> PyResult<Vec<[u32; N]>> {
     rows.iter()
         .enumerate()
         .map(|(row, entries)| {

@@ -91,7 +91,13 @@ impl PyBody {
     fn placement(&self) -> (Vec3, Vec3, f64, Vec3, bool) {
         let parts = self.body.placement.describe();
         let row = |v: [f64; 3]| (v[0], v[1], v[2]);
-        (row(parts.translation), row(parts.axis), parts.angle_degrees, row(parts.scale), parts.sheared)
+        (
+            row(parts.translation),
+            row(parts.axis),
+            parts.angle_degrees,
+            row(parts.scale),
+            parts.sheared,
+        )
     }
 
     #[getter]
@@ -150,11 +156,7 @@ fn invalid(body: &Body, error: &dyn std::fmt::Display) -> PyErr {
 }
 
 fn rigid_key((time, translation, (w, x, y, z)): KeyRow) -> RigidKey {
-    RigidKey {
-        time,
-        translation: DVec3::from(translation),
-        rotation: DQuat::from_xyzw(x, y, z, w),
-    }
+    RigidKey { time, translation: DVec3::from(translation), rotation: DQuat::from_xyzw(x, y, z, w) }
 }
 
 /// A loaded model.
@@ -204,15 +206,11 @@ impl PyModel {
     }
 }
 
-fn structure_to_python<'py>(
-    py: Python<'py>,
-    structure: &Structure,
-) -> PyResult<Bound<'py, PyAny>> {
+fn structure_to_python<'py>(py: Python<'py>, structure: &Structure) -> PyResult<Bound<'py, PyAny>> {
     match structure {
         Structure::Body(index) => Ok(index.into_pyobject(py)?.into_any()),
         Structure::Join(left, right) => {
-            let children =
-                [structure_to_python(py, left)?, structure_to_python(py, right)?];
+            let children = [structure_to_python(py, left)?, structure_to_python(py, right)?];
             Ok(PyTuple::new(py, children)?.into_any())
         }
     }

@@ -214,7 +214,11 @@ impl Simulation {
     ///
     /// # Errors
     /// If the body does not exist, or the number of nodes or a value does not fit.
-    pub fn set_positions(&mut self, body: usize, positions: &[Point]) -> Result<(), SimulationError> {
+    pub fn set_positions(
+        &mut self,
+        body: usize,
+        positions: &[Point],
+    ) -> Result<(), SimulationError> {
         self.check_body(body)?;
         Ok(self.dynamics.set_positions(body, positions)?)
     }
@@ -223,7 +227,11 @@ impl Simulation {
     ///
     /// # Errors
     /// As [`Self::set_positions`].
-    pub fn set_velocities(&mut self, body: usize, velocities: &[Point]) -> Result<(), SimulationError> {
+    pub fn set_velocities(
+        &mut self,
+        body: usize,
+        velocities: &[Point],
+    ) -> Result<(), SimulationError> {
         self.check_body(body)?;
         Ok(self.dynamics.set_velocities(body, velocities)?)
     }
@@ -265,6 +273,18 @@ impl Simulation {
     /// Never for the simulation's own initial state; kept fallible like [`Self::restore`].
     pub fn reset(&mut self) -> Result<(), SimulationError> {
         Ok(self.dynamics.set_state(&self.initial)?)
+    }
+
+    /// The state that [`Self::reset`] returns to.
+    pub(crate) fn initial(&self) -> &State {
+        &self.initial
+    }
+
+    /// Replaces the state that [`Self::reset`] returns to.
+    pub(crate) fn set_initial(&mut self, state: State) -> Result<(), SimulationError> {
+        self.dynamics.set_state(&state)?;
+        self.initial = state;
+        Ok(())
     }
 
     /// The mechanics, for energies and momenta.

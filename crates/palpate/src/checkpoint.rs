@@ -1,0 +1,155 @@
+//! Checkpoints: model, meshes and state in one file, from which a simulation continues bit for bit.
+//!
+//! Layout: magic, format version (u32), payload length (u64), CRC-32 of the payload (u32), all
+//! little-endian, then the payload (postcard).
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use palpate_contact::SceneOptions;
+use palpate_mechanics::State;
+use palpate_model::{Document, Model};
+use serde::{Deserialize, Serialize};
+use tempfile::NamedTempFile;
+
+use crate::simulation::{Simulation, SimulationError, SimulationOptions};
+
+const MAGIC: [u8; 8] = *b"palpate\n";
+const VERSION: u32 = 1;
+const HEADER: usize = 8 + 4 + 8 + 4;
+
+/// Why a checkpoint could not be written or read.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum CheckpointError {
+    /// The file system refused.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// Not a checkpoint, of another version, or damaged.
+    #[error("{}: {reason}", path.display())]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// The checkpoint is whole, but its simulation cannot start.
+    #[error("{}: {source}", path.display())]
+    Simulation {
+        /// The file.
+        path: PathBuf,
+        /// Why not.
+        source: SimulationError,
+    },
+}
+
+/// What a checkpoint holds. The document travels as text, its one exact form.
+#[derive(Deserialize, Serialize)]
+struct Payload<M, S> {
+    model: M,
+    text: Option<String>,
+    time_step: f64,
+    scene: SceneOptions,
+    initial: S,
+    state: S,
+}
+
+impl Simulation {
+    /// Writes a checkpoint to `path`; the file is complete or absent.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn save(&self, path: &Path) -> Result<(), CheckpointError> {
+        let payload = Payload {
+            model: self.model().as_ref(),
+            text: self.model().to_text(),
+            time_step: self.options().time_step,
+            scene: self.options().scene,
+            initial: self.initial(),
+            state: &self.snapshot(),
+        };
+        let io = |source| CheckpointError::Io { path: path.to_path_buf(), source };
+        let bytes = postcard::to_stdvec(&payload)
+            .map_err(|error| io(std::io::Error::other(error.to_string())))?;
+        write_whole(path, &bytes).map_err(io)
+    }
+
+    /// Continues from a checkpoint, bit for bit, with any number of threads.
+    ///
+    /// # Errors
+    /// If the file cannot be read, is damaged, or is not a checkpoint of this version.
+    pub fn load(path: &Path, threads: usize) -> Result<Self, CheckpointError> {
+        let unreadable =
+            |reason: String| CheckpointError::Unreadable { path: path.to_path_buf(), reason };
+        let bytes = std::fs::read(path)
+            .map_err(|source| CheckpointError::Io { path: path.to_path_buf(), source })?;
+        let payload = checked_payload(&bytes).map_err(unreadable)?;
+        let payload: Payload<Model, State> = postcard::from_bytes(payload)
+            .map_err(|error| unreadable(format!("the checkpoint is damaged: {error}")))?;
+        let mut model = payload.model;
+        if let Some(text) = &payload.text {
+            let document = Document::parse(text, path);
+            model.document = Some(document.map_err(|error| unreadable(error.to_string()))?);
+        }
+        let options =
+            SimulationOptions { time_step: payload.time_step, scene: payload.scene, threads };
+        let continued = || {
+            let mut simulation = Simulation::new(Arc::new(model), options)?;
+            simulation.set_initial(payload.initial)?;
+            simulation.restore(&payload.state)?;
+            Ok(simulation)
+        };
+        continued()
+            .map_err(|source| CheckpointError::Simulation { path: path.to_path_buf(), source })
+    }
+}
+
+/// Header and payload into a temporary file beside `path`, then renamed.
+fn write_whole(path: &Path, payload: &[u8]) -> std::io::Result<()> {
+    let folder = match path.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    };
+    let mut file = NamedTempFile::new_in(folder)?;
+    file.write_all(&MAGIC)?;
+    file.write_all(&VERSION.to_le_bytes())?;
+    file.write_all(&(payload.len() as u64).to_le_bytes())?;
+    file.write_all(&crc32fast::hash(payload).to_le_bytes())?;
+    file.write_all(payload)?;
+    file.as_file().sync_all()?;
+    file.persist(path)?;
+    Ok(())
+}
+
+/// The payload of a whole checkpoint, or what is wrong with it.
+fn checked_payload(bytes: &[u8]) -> Result<&[u8], String> {
+    let Some((header, payload)) = bytes.split_at_checked(HEADER) else {
+        return Err("not a palpate checkpoint: the file is too short".into());
+    };
+    let (magic, rest) = header.split_at(MAGIC.len());
+    if magic != MAGIC {
+        return Err("not a palpate checkpoint".into());
+    }
+    let word = |at: usize| u32::from_le_bytes([rest[at], rest[at + 1], rest[at + 2], rest[at + 3]]);
+    let (version, length, checksum) =
+        (word(0), u64::from(word(4)) | u64::from(word(8)) << 32, word(12));
+    if version != VERSION {
+        return Err(format!("checkpoint version {version}, this palpate reads version {VERSION}"));
+    }
+    if payload.len() as u64 != length {
+        let found = payload.len();
+        return Err(format!(
+            "the checkpoint is damaged: {found} bytes of payload, expected {length}"
+        ));
+    }
+    if crc32fast::hash(payload) != checksum {
+        return Err("the checkpoint is damaged: its checksum does not match".into());
+    }
+    Ok(payload)
+}
