@@ -1,0 +1,56 @@
+//! The methods of finding what touches. A new one is a file below and its line in
+//! [`Method::detector`].
+
+mod all_pairs;
+mod hash;
+mod paper;
+
+use std::fmt::Debug;
+
+use crate::scene::{Frame, IntersectionOptions, Intersections, Proximity, SceneBody};
+
+pub(crate) use paper::meeting_triangles;
+
+/// How touching surface elements are found. All give the same pairs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Method {
+    /// The paper's bounding trees: bodies, then leaves against subtrees, then polygons.
+    #[default]
+    Paper,
+    /// Every pair of surface elements: slow and obvious.
+    AllPairs,
+    /// Spatial hashing after Teschner et al. 2003; proximity goes through the bounding trees.
+    Hash,
+}
+
+impl Method {
+    /// All methods.
+    pub const ALL: [Self; 3] = [Self::Paper, Self::AllPairs, Self::Hash];
+
+    pub(crate) fn detector(self) -> Box<dyn Detector> {
+        match self {
+            Self::Paper => Box::new(paper::Paper::default()),
+            Self::AllPairs => Box::new(all_pairs::AllPairs),
+            Self::Hash => Box::new(hash::Hash::default()),
+        }
+    }
+}
+
+/// Distance [m] below which the elements of two bodies are a pair; `None` leaves the pair out.
+pub(crate) type DistanceOf<'a> = &'a (dyn Fn(usize, usize) -> Option<f64> + Sync);
+
+/// A method at work. It fills results that are handed over empty, and keeps its own buffers.
+pub(crate) trait Detector: Debug + Send + Sync {
+    /// Bodies were added, removed or replaced.
+    fn bodies_changed(&mut self, _bodies: &[SceneBody]) {}
+
+    fn intersections(
+        &mut self,
+        frame: &Frame,
+        options: &IntersectionOptions,
+        found: &mut Intersections,
+    );
+
+    fn proximity(&mut self, frame: &Frame, distance: DistanceOf, found: &mut Proximity);
+}

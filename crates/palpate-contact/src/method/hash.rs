@@ -1,0 +1,262 @@
+//! Spatial hashing after Teschner, Heidelberger, Müller, Pomeranets, Gross: *Optimized Spatial Hashing
+//! for Collision Detection of Deformable Objects*, VMV 2003. Here triangle against triangle.
+
+use std::time::Instant;
+
+use palpate_geometry::{Aabb, triangles_intersect, vec3};
+
+use super::paper::Paper;
+use super::{Detector, DistanceOf};
+use crate::leaf_pairs::share_a_node;
+use crate::pairs::TrianglePair;
+use crate::scene::{Frame, IntersectionOptions, Intersections, Proximity, SceneBody};
+
+/// A triangle over more cells is not rasterised but tested against all others: one long sliver must not
+/// fill the memory.
+const MOST_CELLS: u64 = 1 << 12;
+
+/// Cells along the scene's longest side at most, so that cell numbers stay exact.
+const MOST_CELLS_ALONG: f64 = (1 << 30) as f64;
+
+const END: u32 = u32::MAX;
+
+/// Hash table of cells and its buffers.
+#[derive(Debug, Default)]
+pub(super) struct Hash {
+    /// Mean edge length of all surfaces [m]: the cell size that the paper recommends.
+    mean_edge: f64,
+    /// Raised each step: a bucket with an older stamp is empty, so that nothing has to be cleared.
+    stamp: u32,
+    buckets: Vec<Bucket>,
+    entries: Vec<Entry>,
+    triangles: Vec<Triangle>,
+    large: Vec<u32>,
+    tree: Paper,
+}
+
+#[derive(Clone, Copy, Debug, Default)]
+struct Bucket {
+    stamp: u32,
+    first: u32,
+}
+
+/// A triangle in a cell; entries of a bucket form a list.
+#[derive(Clone, Copy, Debug)]
+struct Entry {
+    cell: [i64; 3],
+    triangle: u32,
+    next: u32,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Triangle {
+    body: u32,
+    triangle: u32,
+    bounds: Aabb,
+    first_cell: [i64; 3],
+}
+
+impl Detector for Hash {
+    fn bodies_changed(&mut self, bodies: &[SceneBody]) {
+        let (mut sum, mut count) = (0.0, 0.0);
+        for body in bodies {
+            for edge in body.mesh.surface_edges() {
+                let [a, b] = edge.map(|node| body.positions[node as usize]);
+                sum += vec3::norm(vec3::sub(b, a));
+                count += 1.0;
+            }
+        }
+        self.mean_edge = if count > 0.0 { sum / count } else { 0.0 };
+    }
+
+    fn intersections(
+        &mut self,
+        frame: &Frame,
+        options: &IntersectionOptions,
+        found: &mut Intersections,
+    ) {
+        let start = Instant::now();
+        found.stats.all_pairs = frame.all_pairs(options.self_contact);
+        found.stats.object_pairs =
+            if frame.bodies.is_empty() { 0 } else { 1 };
+        self.collect_triangles(frame);
+        let grid = Grid::new(&frame.upper.bounds(), self.mean_edge);
+        let bucket_count = (4 * self.triangles.len()).next_power_of_two();
+        if self.buckets.len() < bucket_count {
+            self.buckets.resize(bucket_count, Bucket::default());
+        }
+        if self.stamp == u32::MAX {
+            self.buckets.fill(Bucket::default());
+            self.stamp = 0;
+        }
+        self.stamp += 1;
+        self.entries.clear();
+        self.large.clear();
+        found.stats.traversal_time = start.elapsed();
+
+        let testing = Instant::now();
+        for index in 0..self.triangles.len() as u32 {
+            self.insert(frame, options, &grid, index, found);
+        }
+        self.test_large(frame, options, found);
+        found.stats.cell_entries = self.entries.len() as u64;
+        found.pairs.sort_unstable();
+        found.stats.polygon_time = testing.elapsed();
+    }
+
+    fn proximity(&mut self, frame: &Frame, distance: DistanceOf, found: &mut Proximity) {
+        self.tree.proximity(frame, distance, found);
+    }
+}
+
+impl Hash {
+    fn collect_triangles(&mut self, frame: &Frame) {
+        self.triangles.clear();
+        for (body, scene_body) in frame.bodies.iter().enumerate() {
+            for triangle in 0..scene_body.mesh.triangles().len() as u32 {
+                self.triangles.push(Triangle {
+                    body: body as u32,
+                    triangle,
+                    bounds: Aabb::from_points(&scene_body.triangle(triangle)),
+                    first_cell: [0; 3],
+                });
+            }
+        }
+    }
+
+    /// Puts a triangle into the cells of its box, testing it against those already there.
+    fn insert(
+        &mut self,
+        frame: &Frame,
+        options: &IntersectionOptions,
+        grid: &Grid,
+        index: u32,
+        found: &mut Intersections,
+    ) {
+        let own = self.triangles[index as usize];
+        let (first, last) = (grid.cell(own.bounds.min), grid.cell(own.bounds.max));
+        self.triangles[index as usize].first_cell = first;
+        let along = |axis: usize| (last[axis] - first[axis] + 1) as u64;
+        let cells = along(0).saturating_mul(along(1)).saturating_mul(along(2));
+        if cells > MOST_CELLS {
+            self.large.push(index);
+            return;
+        }
+        for x in first[0]..=last[0] {
+            for y in first[1]..=last[1] {
+                for z in first[2]..=last[2] {
+                    self.insert_in_cell(frame, options, index, [x, y, z], found);
+                }
+            }
+        }
+    }
+
+    fn insert_in_cell(
+        &mut self,
+        frame: &Frame,
+        options: &IntersectionOptions,
+        index: u32,
+        cell: [i64; 3],
+        found: &mut Intersections,
+    ) {
+        let slot = hash(cell) as usize & (self.buckets.len() - 1);
+        let bucket = self.buckets[slot];
+        let head = if bucket.stamp == self.stamp { bucket.first } else { END };
+        let own = self.triangles[index as usize];
+        let mut at = head;
+        while at != END {
+            let entry = self.entries[at as usize];
+            at = entry.next;
+            // Other cells fall into the same bucket; and a pair with several cells in common is tested
+            // in the first of them only.
+            let other = self.triangles[entry.triangle as usize];
+            let first_common: [i64; 3] =
+                std::array::from_fn(|axis| own.first_cell[axis].max(other.first_cell[axis]));
+            if entry.cell == cell && first_common == cell {
+                test(frame, options, &own, &other, found);
+            }
+        }
+        self.buckets[slot] = Bucket { stamp: self.stamp, first: self.entries.len() as u32 };
+        self.entries.push(Entry { cell, triangle: index, next: head });
+    }
+
+    /// Tests the triangles that were too large for the cells against all others.
+    fn test_large(
+        &self,
+        frame: &Frame,
+        options: &IntersectionOptions,
+        found: &mut Intersections,
+    ) {
+        for &large in &self.large {
+            for (index, other) in self.triangles.iter().enumerate() {
+                let index = index as u32;
+                // Two large ones once; `large` is ascending.
+                let counted = index <= large && self.large.binary_search(&index).is_ok();
+                if !counted {
+                    test(frame, options, &self.triangles[large as usize], other, found);
+                }
+            }
+        }
+    }
+}
+
+fn test(
+    frame: &Frame,
+    options: &IntersectionOptions,
+    one: &Triangle,
+    other: &Triangle,
+    found: &mut Intersections,
+) {
+    let same = one.body == other.body;
+    if same && !options.self_contact {
+        return;
+    }
+    found.stats.box_tests += 1;
+    if !one.bounds.intersects(&other.bounds) {
+        return;
+    }
+    let in_order = (one.body, one.triangle) < (other.body, other.triangle);
+    let (one, other) = if in_order { (one, other) } else { (other, one) };
+    let (a, b) = (&frame.bodies[one.body as usize], &frame.bodies[other.body as usize]);
+    let corners_a = a.mesh.triangles()[one.triangle as usize];
+    let corners_b = b.mesh.triangles()[other.triangle as usize];
+    if same && share_a_node(corners_a, corners_b) {
+        return;
+    }
+    found.stats.polygon_tests += 1;
+    if triangles_intersect(&a.triangle(one.triangle), &b.triangle(other.triangle)) {
+        found.pairs.push(TrianglePair {
+            body_a: one.body,
+            triangle_a: one.triangle,
+            body_b: other.body,
+            triangle_b: other.triangle,
+        });
+    }
+}
+
+/// Cells of one size over the scene.
+struct Grid {
+    origin: [f64; 3],
+    cell_size: f64,
+}
+
+impl Grid {
+    fn new(bounds: &Aabb, mean_edge: f64) -> Self {
+        let longest = bounds.extent().into_iter().fold(0.0, f64::max);
+        let cell_size = mean_edge.max(longest / MOST_CELLS_ALONG);
+        Self { origin: bounds.min, cell_size: if cell_size > 0.0 { cell_size } else { 1.0 } }
+    }
+
+    /// The cell of a point; monotone on each axis also in floating point, so that boxes which meet
+    /// have a cell in common.
+    fn cell(&self, point: [f64; 3]) -> [i64; 3] {
+        std::array::from_fn(|axis| ((point[axis] - self.origin[axis]) / self.cell_size) as i64)
+    }
+}
+
+/// The hash function of the 2003 paper.
+fn hash([x, y, z]: [i64; 3]) -> u64 {
+    x.wrapping_mul(73_856_093) as u64
+        ^ y.wrapping_mul(19_349_663) as u64
+        ^ z.wrapping_mul(83_492_791) as u64
+}

@@ -1,0 +1,179 @@
+//! The paper's method: bodies by the upper tree, leaves by the bounding trees, then the polygons.
+
+use std::time::Instant;
+
+use palpate_geometry::{Aabb, triangles_intersect};
+
+use super::{Detector, DistanceOf};
+use crate::bounding_tree::corner_points;
+use crate::leaf_pairs::{BodyPair, Cost, LeafPairSearch, share_a_node, widened};
+use crate::pairs::{ProximityPair, TrianglePair};
+use crate::proximity::{edge_pair, sort, vertex_triangle};
+use crate::scene::{Frame, IntersectionOptions, Intersections, Proximity, SceneBody};
+
+/// Buffers of the paper's method.
+#[derive(Debug, Default)]
+pub(super) struct Paper {
+    objects: Vec<(u32, u32)>,
+    meeting: LeafPairSearch<TrianglePair>,
+    close: LeafPairSearch<ProximityPair>,
+}
+
+impl Detector for Paper {
+    fn intersections(
+        &mut self,
+        frame: &Frame,
+        options: &IntersectionOptions,
+        found: &mut Intersections,
+    ) {
+        let start = Instant::now();
+        let stats = &mut found.stats;
+        stats.all_pairs = frame.all_pairs(options.self_contact);
+        self.objects.clear();
+        stats.nodes_visited += frame.upper.pairs(&mut self.objects);
+        let body_pairs = &mut self.meeting.body_pairs;
+        body_pairs.clear();
+        body_pairs.extend(self.objects.iter().map(|&(a, b)| BodyPair::meeting(a, b)));
+        if options.self_contact {
+            let bodies = 0..frame.bodies.len() as u32;
+            body_pairs.extend(bodies.map(|body| BodyPair::meeting(body, body)));
+        }
+        stats.object_time = start.elapsed();
+        self.meeting.run(
+            frame,
+            options.same_leaf,
+            &mut found.pairs,
+            stats,
+            |pair, triangles, found, cost| {
+                found.extend(meeting_triangles(frame, pair, triangles, cost));
+            },
+        );
+        let sorting = Instant::now();
+        found.pairs.sort_unstable();
+        found.stats.polygon_time += sorting.elapsed();
+    }
+
+    fn proximity(&mut self, frame: &Frame, distance: DistanceOf, found: &mut Proximity) {
+        let start = Instant::now();
+        let stats = &mut found.stats;
+        stats.all_pairs = frame.all_pairs(true);
+        let scene_bounds = frame.upper.bounds();
+        let body_pairs = &mut self.close.body_pairs;
+        body_pairs.clear();
+        for (a, body_a) in frame.bodies.iter().enumerate() {
+            for (b, body_b) in frame.bodies.iter().enumerate().skip(a) {
+                let Some(distance) = distance(a, b).filter(|&distance| distance > 0.0) else {
+                    continue;
+                };
+                let pair = BodyPair::within(a as u32, b as u32, distance, &scene_bounds);
+                if widened(&body_a.tree.bounds(), pair.margin).intersects(&body_b.tree.bounds()) {
+                    body_pairs.push(pair);
+                }
+            }
+        }
+        stats.object_time = start.elapsed();
+        self.close.run(frame, true, &mut found.pairs, stats, |pair, triangles, found, cost| {
+            close_features(frame.bodies, pair, triangles, found, cost);
+        });
+        let sorting = Instant::now();
+        sort(&mut found.pairs);
+        found.stats.polygon_time += sorting.elapsed();
+    }
+}
+
+/// The exact test of two triangles, given by their positions in the trees.
+pub(crate) fn meeting_triangles(
+    frame: &Frame,
+    pair: &BodyPair,
+    [i, j]: [u32; 2],
+    cost: &mut Cost,
+) -> Option<TrianglePair> {
+    let (a, b) = (&frame.bodies[pair.a as usize], &frame.bodies[pair.b as usize]);
+    let (corners_a, corners_b) = (a.tree.corners(i), b.tree.corners(j));
+    if pair.is_self() && share_a_node(corners_a, corners_b) {
+        return None;
+    }
+    cost.polygon_tests += 1;
+    let points_a = corner_points(&a.positions, corners_a);
+    let points_b = corner_points(&b.positions, corners_b);
+    if !triangles_intersect(&points_a, &points_b) {
+        return None;
+    }
+    let mut triangle_a = a.tree.triangle_order()[i as usize];
+    let mut triangle_b = b.tree.triangle_order()[j as usize];
+    if pair.is_self() && triangle_b < triangle_a {
+        std::mem::swap(&mut triangle_a, &mut triangle_b);
+    }
+    Some(TrianglePair { body_a: pair.a, triangle_a, body_b: pair.b, triangle_b })
+}
+
+/// One triangle of a pair, as its features need it.
+struct Side<'a> {
+    body: u32,
+    scene_body: &'a SceneBody,
+    triangle: u32,
+    corners: [u32; 3],
+    owned: u8,
+    bounds: &'a Aabb,
+}
+
+impl<'a> Side<'a> {
+    fn new(bodies: &'a [SceneBody], body: u32, position: u32) -> Self {
+        let scene_body = &bodies[body as usize];
+        Self {
+            body,
+            scene_body,
+            triangle: scene_body.tree.triangle_order()[position as usize],
+            corners: scene_body.tree.corners(position),
+            owned: scene_body.surface.owned[position as usize],
+            bounds: scene_body.tree.triangle_bounds(position),
+        }
+    }
+
+    fn owned_nodes(&self) -> impl Iterator<Item = u32> {
+        (0..3).filter(|i| self.owned >> i & 1 == 1).map(|i| self.corners[i])
+    }
+
+    /// The owned edges that come within `margin` of `other`.
+    fn owned_edges(&self, other: &Aabb, margin: f64) -> impl Iterator<Item = (u32, Aabb)> {
+        let edges = self.scene_body.mesh.triangle_edges()[self.triangle as usize];
+        (0..3).filter(|i| self.owned >> (3 + i) & 1 == 1).filter_map(move |i| {
+            let ends = [self.corners[i], self.corners[(i + 1) % 3]];
+            let points = ends.map(|node| self.scene_body.positions[node as usize]);
+            let near = widened(&Aabb::from_points(&points), margin);
+            near.intersects(other).then_some((edges[i], near))
+        })
+    }
+}
+
+/// The close features of two triangles, of those that each of them owns.
+fn close_features(
+    bodies: &[SceneBody],
+    pair: &BodyPair,
+    [i, j]: [u32; 2],
+    found: &mut Vec<ProximityPair>,
+    cost: &mut Cost,
+) {
+    let a = Side::new(bodies, pair.a, i);
+    let b = Side::new(bodies, pair.b, j);
+    let margin_squared = pair.margin * pair.margin * (1.0 + 1e-9);
+    for (from, to) in [(&a, &b), (&b, &a)] {
+        for node in from.owned_nodes() {
+            let point = &from.scene_body.positions[node as usize];
+            if to.bounds.distance_squared(point) <= margin_squared {
+                cost.polygon_tests += 1;
+                let elements = [node, to.triangle];
+                let bodies_of_pair = [from.body, to.body];
+                found.extend(vertex_triangle(bodies, bodies_of_pair, elements, pair.distance));
+            }
+        }
+    }
+    for (edge_a, near_a) in a.owned_edges(b.bounds, pair.margin) {
+        for (edge_b, _) in b.owned_edges(&near_a, 0.0) {
+            cost.polygon_tests += 1;
+            let swapped = pair.is_self() && edge_b < edge_a;
+            let edges = if swapped { [edge_b, edge_a] } else { [edge_a, edge_b] };
+            found.extend(edge_pair(bodies, [pair.a, pair.b], edges, pair.distance));
+        }
+    }
+}

@@ -1,0 +1,356 @@
+//! The scene: bodies whose nodes move, and what touches what among them.
+
+mod error;
+mod results;
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use palpate_geometry::{Aabb, Point, vec3};
+use palpate_model::{Mesh, Structure};
+use rayon::prelude::*;
+use rayon::{ThreadPool, ThreadPoolBuilder};
+
+use crate::bounding_tree::{BoundingTree, Split, corner_points};
+use crate::method::Detector;
+use crate::penetration::PenetrationSearch;
+use crate::surface::Surface;
+use crate::upper_tree::UpperTree;
+
+pub use crate::method::Method;
+pub use error::SceneError;
+pub use results::{
+    ClosestPoint, DetectionStats, Intersections, Penetration, Proximity, UpdateStats,
+};
+
+/// How a scene is built and searched.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SceneOptions {
+    /// Most tetrahedra in a leaf: the paper's K.
+    pub leaf_size: usize,
+    /// Where boxes are split.
+    pub split: Split,
+    /// How touching triangles are found.
+    pub method: Method,
+    /// Threads that detection may use; results are the same for any number.
+    pub threads: usize,
+}
+
+impl Default for SceneOptions {
+    fn default() -> Self {
+        Self { leaf_size: 2, split: Split::Middle, method: Method::Paper, threads: 1 }
+    }
+}
+
+/// What counts as an intersection.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct IntersectionOptions {
+    /// Also pairs of triangles of one body.
+    pub self_contact: bool,
+    /// Also pairs of triangles of one leaf, which the paper exempts. Methods without leaves always
+    /// test them.
+    pub same_leaf: bool,
+}
+
+impl Default for IntersectionOptions {
+    fn default() -> Self {
+        Self { self_contact: true, same_leaf: true }
+    }
+}
+
+/// One body: its mesh and what follows from it, and where its nodes are now.
+#[derive(Debug)]
+pub(crate) struct SceneBody {
+    pub(crate) mesh: Arc<Mesh>,
+    pub(crate) positions: Vec<Point>,
+    pub(crate) tree: BoundingTree,
+    pub(crate) surface: Surface,
+}
+
+impl SceneBody {
+    fn new(mesh: Arc<Mesh>, options: &SceneOptions) -> Self {
+        let tree = BoundingTree::new(&mesh, options.leaf_size, options.split);
+        let surface = Surface::new(&mesh, tree.triangle_order());
+        Self { positions: mesh.nodes().to_vec(), mesh, tree, surface }
+    }
+
+    pub(crate) fn triangle(&self, triangle: u32) -> [Point; 3] {
+        corner_points(&self.positions, self.mesh.triangles()[triangle as usize])
+    }
+}
+
+/// What a search sees of the scene.
+#[derive(Clone, Copy)]
+pub(crate) struct Frame<'a> {
+    pub(crate) bodies: &'a [SceneBody],
+    pub(crate) upper: &'a UpperTree,
+    pub(crate) pool: Option<&'a ThreadPool>,
+}
+
+impl Frame<'_> {
+    /// Pairs of triangles that the double loop would test.
+    pub(crate) fn all_pairs(&self, self_contact: bool) -> u64 {
+        let counts = self.bodies.iter().map(|body| body.mesh.triangles().len() as u64);
+        let (mut pairs, mut before) = (0, 0);
+        for count in counts {
+            pairs += before * count;
+            before += count;
+            if self_contact {
+                pairs += count * count.saturating_sub(1) / 2;
+            }
+        }
+        pairs
+    }
+}
+
+/// Bodies in one space, their bounding trees, and the search for what touches.
+///
+/// Bodies are named by index. Results are borrowed from the scene, which reuses their memory: at
+/// steady state no call allocates when `threads` is 1.
+#[derive(Debug)]
+pub struct Scene {
+    bodies: Vec<SceneBody>,
+    upper: UpperTree,
+    options: SceneOptions,
+    pool: Option<ThreadPool>,
+    detector: Box<dyn Detector>,
+    penetration_search: PenetrationSearch,
+    intersections: Intersections,
+    proximity: Proximity,
+    penetration: Penetration,
+}
+
+impl Scene {
+    /// A scene of `meshes` at their own positions.
+    ///
+    /// `structure` is the upper tree that a model's text describes; without one it is made from where
+    /// the bodies are. It changes the cost of finding body pairs, never the result.
+    ///
+    /// # Errors
+    /// If there are no meshes, an option is zero, the structure does not name each body once, or the
+    /// threads could not be started.
+    pub fn new(
+        meshes: Vec<Arc<Mesh>>,
+        structure: Option<&Structure>,
+        options: SceneOptions,
+    ) -> Result<Self, SceneError> {
+        if meshes.is_empty() {
+            return Err(SceneError::NoMeshes);
+        }
+        if options.leaf_size == 0 {
+            return Err(SceneError::LeafSize);
+        }
+        let pool = start_threads(options.threads)?;
+        let upper = match structure {
+            Some(structure) => UpperTree::from_structure(structure, meshes.len())?,
+            None => {
+                let bounds: Vec<Aabb> = meshes.iter().map(|mesh| mesh.bounds()).collect();
+                UpperTree::from_bounds(&bounds)
+            }
+        };
+        let bodies = meshes.into_iter().map(|mesh| SceneBody::new(mesh, &options)).collect();
+        let mut scene = Self {
+            bodies,
+            upper,
+            options,
+            pool,
+            detector: options.method.detector(),
+            penetration_search: PenetrationSearch::default(),
+            intersections: Intersections::default(),
+            proximity: Proximity::default(),
+            penetration: Penetration::default(),
+        };
+        scene.bodies_changed();
+        Ok(scene)
+    }
+
+    /// Adds a body at its mesh's positions and returns its index, the last. In the upper tree a new
+    /// root joins it with all others.
+    pub fn add(&mut self, mesh: Arc<Mesh>) -> usize {
+        self.bodies.push(SceneBody::new(mesh, &self.options));
+        self.upper.add();
+        self.bodies_changed();
+        self.bodies.len() - 1
+    }
+
+    /// Takes a body out and returns its mesh; the bodies after it move down by one index.
+    ///
+    /// # Errors
+    /// If there is no such body.
+    pub fn remove(&mut self, body: usize) -> Result<Arc<Mesh>, SceneError> {
+        self.check_body(body)?;
+        let removed = self.bodies.remove(body);
+        self.upper.remove(body);
+        self.bodies_changed();
+        Ok(removed.mesh)
+    }
+
+    /// Gives a body another mesh, at that mesh's positions, and returns the former one.
+    ///
+    /// # Errors
+    /// If there is no such body.
+    pub fn replace(&mut self, body: usize, mesh: Arc<Mesh>) -> Result<Arc<Mesh>, SceneError> {
+        self.check_body(body)?;
+        let new = SceneBody::new(mesh, &self.options);
+        let former = std::mem::replace(&mut self.bodies[body], new);
+        self.bodies_changed();
+        Ok(former.mesh)
+    }
+
+    /// Number of bodies.
+    pub fn body_count(&self) -> usize {
+        self.bodies.len()
+    }
+
+    /// A body's mesh.
+    ///
+    /// # Panics
+    /// If there is no such body; so do `positions` and `tree`.
+    pub fn mesh(&self, body: usize) -> &Arc<Mesh> {
+        &self.bodies[body].mesh
+    }
+
+    /// A body's node positions [m] of the last update, shape (n, 3).
+    pub fn positions(&self, body: usize) -> &[Point] {
+        &self.bodies[body].positions
+    }
+
+    /// A body's bounding tree, refitted to its positions.
+    pub fn tree(&self, body: usize) -> &BoundingTree {
+        &self.bodies[body].tree
+    }
+
+    /// How the scene was built.
+    pub fn options(&self) -> &SceneOptions {
+        &self.options
+    }
+
+    /// Moves the bodies: refits each bounding tree bottom-up, then the upper tree.
+    ///
+    /// `positions` [m]: for each body one entry per node.
+    ///
+    /// # Errors
+    /// If counts do not fit or a number is not finite; the scene is then unchanged.
+    pub fn update(&mut self, positions: &[&[Point]]) -> Result<UpdateStats, SceneError> {
+        let start = Instant::now();
+        self.check_positions(positions)?;
+        let move_body = |body: &mut SceneBody, positions: &[Point]| {
+            body.positions.copy_from_slice(positions);
+            body.tree.refit(positions);
+        };
+        if let Some(pool) = &self.pool {
+            let bodies = self.bodies.par_iter_mut().zip(positions);
+            pool.install(|| bodies.for_each(|(body, positions)| move_body(body, positions)));
+        } else {
+            for (body, positions) in self.bodies.iter_mut().zip(positions) {
+                move_body(body, positions);
+            }
+        }
+        self.upper.refit(|body| self.bodies[body].tree.bounds());
+        let nodes_refitted = self.bodies.iter().map(|body| body.tree.nodes().len() as u64).sum();
+        Ok(UpdateStats { time: start.elapsed(), nodes_refitted })
+    }
+
+    /// All pairs of surface triangles that meet (closed: touching counts), decided exactly. Triangles
+    /// of one body that share a node are left out.
+    pub fn intersections(&mut self, options: &IntersectionOptions) -> &Intersections {
+        let frame = Frame { bodies: &self.bodies, upper: &self.upper, pool: self.pool.as_ref() };
+        self.intersections.pairs.clear();
+        self.intersections.stats = DetectionStats::default();
+        self.detector.intersections(&frame, options, &mut self.intersections);
+        &self.intersections
+    }
+
+    /// All vertex-triangle and edge-edge pairs that share no node and are closer than the distance of
+    /// their bodies, strictly.
+    ///
+    /// `distance` is called once per body pair a <= b, a == b being self-contact, and gives metres;
+    /// `None` leaves the pair out. Vertex-triangle pairs come in both directions between two bodies.
+    pub fn proximity(
+        &mut self,
+        distance: &(dyn Fn(usize, usize) -> Option<f64> + Sync),
+    ) -> &Proximity {
+        let frame = Frame { bodies: &self.bodies, upper: &self.upper, pool: self.pool.as_ref() };
+        self.proximity.pairs.clear();
+        self.proximity.stats = DetectionStats::default();
+        self.detector.proximity(&frame, distance, &mut self.proximity);
+        &self.proximity
+    }
+
+    /// Every surface node that is strictly inside another body with a closed surface, and its way out.
+    ///
+    /// `include(body, into_body)` is asked for ordered pairs of different bodies. Inside is where the
+    /// surface's winding number is not zero, decided exactly; the exit is the closest point of the
+    /// surface. Every method finds these through the bounding trees.
+    ///
+    /// Known limits: a node deeper than half the body's thickness leaves on the far side.
+    pub fn penetration(
+        &mut self,
+        include: &(dyn Fn(usize, usize) -> bool + Sync),
+    ) -> &Penetration {
+        let frame = Frame { bodies: &self.bodies, upper: &self.upper, pool: self.pool.as_ref() };
+        self.penetration.nodes.clear();
+        self.penetration.stats = DetectionStats::default();
+        self.penetration_search.run(&frame, include, &mut self.penetration);
+        &self.penetration
+    }
+
+    /// The point of a body's surface closest to `point` [m], if one is at most `within` [m] away.
+    ///
+    /// # Panics
+    /// If there is no such body.
+    pub fn closest_point(&self, body: usize, point: Point, within: f64) -> Option<ClosestPoint> {
+        let body = &self.bodies[body];
+        let found = body.tree.closest_point(&body.positions, point, within)?;
+        let [a, b, c] = body.triangle(found.triangle);
+        let [wa, wb, wc] = found.weights;
+        Some(ClosestPoint {
+            triangle: found.triangle,
+            weights: found.weights,
+            position: vec3::add_scaled(vec3::add_scaled(vec3::scale(a, wa), b, wb), c, wc),
+            distance: found.distance_squared.sqrt(),
+            inside: body.is_inside(&point),
+        })
+    }
+
+    fn bodies_changed(&mut self) {
+        self.upper.refit(|body| self.bodies[body].tree.bounds());
+        self.detector.bodies_changed(&self.bodies);
+    }
+
+    fn check_body(&self, body: usize) -> Result<(), SceneError> {
+        let count = self.bodies.len();
+        if body < count { Ok(()) } else { Err(SceneError::BodyOutOfRange { body, count }) }
+    }
+
+    fn check_positions(&self, positions: &[&[Point]]) -> Result<(), SceneError> {
+        let expected = self.bodies.len();
+        if positions.len() != expected {
+            return Err(SceneError::BodyCount { given: positions.len(), expected });
+        }
+        for (index, (body, given)) in self.bodies.iter().zip(positions).enumerate() {
+            let expected = body.positions.len();
+            if given.len() != expected {
+                return Err(SceneError::NodeCount { body: index, given: given.len(), expected });
+            }
+        }
+        for (body, given) in positions.iter().enumerate() {
+            let finite = |position: &Point| position.iter().all(|value| value.is_finite());
+            if let Some(node) = given.iter().position(|position| !finite(position)) {
+                return Err(SceneError::NotFinite { body, node, position: given[node] });
+            }
+        }
+        Ok(())
+    }
+}
+
+fn start_threads(threads: usize) -> Result<Option<ThreadPool>, SceneError> {
+    match threads {
+        0 => Err(SceneError::Threads),
+        1 => Ok(None),
+        _ => match ThreadPoolBuilder::new().num_threads(threads).build() {
+            Ok(pool) => Ok(Some(pool)),
+            Err(error) => Err(SceneError::ThreadPool { threads, reason: error.to_string() }),
+        },
+    }
+}

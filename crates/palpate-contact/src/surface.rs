@@ -1,0 +1,91 @@
+//! What detection needs to know of a body's surface besides its tree: who owns which feature, whether
+//! the surface is closed, and which parts hang together.
+
+use palpate_model::Mesh;
+use palpate_model::mesh::NONE;
+
+/// Fixed facts of a surface.
+///
+/// Each node and edge is owned by the first triangle (in tree order) that has it, so that a pair of
+/// features is met in exactly one pair of triangles.
+#[derive(Clone, Debug)]
+pub(crate) struct Surface {
+    /// Per triangle, in tree order: bit i set when it owns its node i, bit 3 + i its edge i (ab, bc, ca).
+    pub(crate) owned: Vec<u8>,
+    /// Per surface edge, the triangle that owns it, as an index into the mesh's triangles.
+    pub(crate) edge_owners: Vec<u32>,
+    /// Whether the surface bounds a volume: every edge is passed as often forwards as backwards.
+    pub(crate) closed: bool,
+    /// Per node, the smallest node of its connected part of the surface; itself for an inner node.
+    pub(crate) components: Vec<u32>,
+}
+
+impl Surface {
+    pub(crate) fn new(mesh: &Mesh, triangle_order: &[u32]) -> Self {
+        let mut node_seen = vec![false; mesh.nodes().len()];
+        let mut edge_owners = vec![NONE; mesh.surface_edges().len()];
+        let owned = triangle_order
+            .iter()
+            .map(|&triangle| {
+                let nodes = mesh.triangles()[triangle as usize];
+                let edges = mesh.triangle_edges()[triangle as usize];
+                let mut bits = 0;
+                for i in 0..3 {
+                    if !std::mem::replace(&mut node_seen[nodes[i] as usize], true) {
+                        bits |= 1 << i;
+                    }
+                    let owner = &mut edge_owners[edges[i] as usize];
+                    if *owner == NONE {
+                        *owner = triangle;
+                        bits |= 8 << i;
+                    }
+                }
+                bits
+            })
+            .collect();
+        let mut components = Vec::new();
+        join_nodes(mesh, &mut components, |_| true);
+        Self { owned, edge_owners, closed: is_closed(mesh), components }
+    }
+}
+
+fn is_closed(mesh: &Mesh) -> bool {
+    let mut balance = vec![0_i32; mesh.surface_edges().len()];
+    for (nodes, edges) in mesh.triangles().iter().zip(mesh.triangle_edges()) {
+        for side in 0..3 {
+            let forwards = nodes[side] < nodes[(side + 1) % 3];
+            balance[edges[side] as usize] += if forwards { 1 } else { -1 };
+        }
+    }
+    !balance.is_empty() && balance.iter().all(|&balance| balance == 0)
+}
+
+/// Labels each node with the smallest node that the triangles of `keep` connect it with.
+pub(crate) fn join_nodes(mesh: &Mesh, labels: &mut Vec<u32>, keep: impl Fn(u32) -> bool) {
+    labels.clear();
+    labels.extend(0..mesh.nodes().len() as u32);
+    for (triangle, &[a, b, c]) in mesh.triangles().iter().enumerate() {
+        if keep(triangle as u32) {
+            join(labels, a, b);
+            join(labels, b, c);
+        }
+    }
+    // Labels never exceed their index: one sweep upwards makes each of them final.
+    for node in 0..labels.len() {
+        labels[node] = labels[labels[node] as usize];
+    }
+}
+
+fn join(labels: &mut [u32], a: u32, b: u32) {
+    let (a, b) = (root(labels, a), root(labels, b));
+    labels[a.max(b) as usize] = a.min(b);
+}
+
+fn root(labels: &mut [u32], mut node: u32) -> u32 {
+    while labels[node as usize] != node {
+        let above = labels[labels[node as usize] as usize];
+        labels[node as usize] = above;
+        node = above;
+    }
+    node
+}
