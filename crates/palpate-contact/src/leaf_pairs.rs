@@ -261,7 +261,7 @@ pub(crate) fn for_each<T: Send>(
     work: impl Fn(&mut T) + Sync,
 ) {
     match pool {
-        Some(pool) => pool.install(|| items.par_iter_mut().for_each(work)),
+        Some(pool) => pool.install(|| items.par_iter_mut().for_each(&work)),
         None => items.iter_mut().for_each(work),
     }
 }

@@ -48,7 +48,7 @@ pub(crate) trait Detector: Debug + Send + Sync {
     fn intersections(
         &mut self,
         frame: &Frame,
-        options: &IntersectionOptions,
+        options: IntersectionOptions,
         found: &mut Intersections,
     );
 

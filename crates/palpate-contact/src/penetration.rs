@@ -8,8 +8,8 @@ use std::time::Instant;
 
 use palpate_geometry::{Point, vec3};
 
-use crate::bounding_tree::corner_points;
 use crate::bounding_tree::Side;
+use crate::bounding_tree::corner_points;
 use crate::leaf_pairs::{BodyPair, Cost, LeafPairSearch, for_each};
 use crate::method::meeting_triangles;
 use crate::pairs::{PenetratingNode, TrianglePair};

@@ -25,7 +25,7 @@ pub(crate) fn vertex_triangle(
     let points = b.triangle(triangle);
     let found = point_triangle(point, &points);
     let gap = found.distance_squared.sqrt();
-    if !(gap < distance) {
+    if gap >= distance {
         return None;
     }
     let [wa, wb, wc] = found.weights;
@@ -61,7 +61,7 @@ pub(crate) fn edge_pair(
     let points_b = nodes_b.map(|node| b.positions[node as usize]);
     let found = edge_edge(&points_a, &points_b);
     let gap = found.distance_squared.sqrt();
-    if !(gap < distance) {
+    if gap >= distance {
         return None;
     }
     let (s, t) = (found.s, found.t);

@@ -141,12 +141,11 @@ impl Scene {
             return Err(SceneError::LeafSize);
         }
         let pool = start_threads(options.threads)?;
-        let upper = match structure {
-            Some(structure) => UpperTree::from_structure(structure, meshes.len())?,
-            None => {
-                let bounds: Vec<Aabb> = meshes.iter().map(|mesh| mesh.bounds()).collect();
-                UpperTree::from_bounds(&bounds)
-            }
+        let upper = if let Some(structure) = structure {
+            UpperTree::from_structure(structure, meshes.len())?
+        } else {
+            let bounds: Vec<Aabb> = meshes.iter().map(|mesh| mesh.bounds()).collect();
+            UpperTree::from_bounds(&bounds)
         };
         let bodies = meshes.into_iter().map(|mesh| SceneBody::new(mesh, &options)).collect();
         let mut scene = Self {
@@ -257,7 +256,7 @@ impl Scene {
         let frame = Frame { bodies: &self.bodies, upper: &self.upper, pool: self.pool.as_ref() };
         self.intersections.pairs.clear();
         self.intersections.stats = DetectionStats::default();
-        self.detector.intersections(&frame, options, &mut self.intersections);
+        self.detector.intersections(&frame, *options, &mut self.intersections);
         &self.intersections
     }
 
@@ -284,10 +283,7 @@ impl Scene {
     /// surface. Every method finds these through the bounding trees.
     ///
     /// Known limits: a node deeper than half the body's thickness leaves on the far side.
-    pub fn penetration(
-        &mut self,
-        include: &(dyn Fn(usize, usize) -> bool + Sync),
-    ) -> &Penetration {
+    pub fn penetration(&mut self, include: &(dyn Fn(usize, usize) -> bool + Sync)) -> &Penetration {
         let frame = Frame { bodies: &self.bodies, upper: &self.upper, pool: self.pool.as_ref() };
         self.penetration.nodes.clear();
         self.penetration.stats = DetectionStats::default();

@@ -65,7 +65,8 @@ impl UpperTree {
                 shape.extend(range.first().map(|&body| Some(body)));
                 continue;
             }
-            let all = range.iter().fold(Aabb::EMPTY, |all, &body| all.union(&bounds[body as usize]));
+            let all =
+                range.iter().fold(Aabb::EMPTY, |all, &body| all.union(&bounds[body as usize]));
             let axis = all.longest_axis();
             let center = |body: u32| bounds[body as usize].center()[axis];
             range.sort_unstable_by(|&left, &right| {
@@ -99,7 +100,8 @@ impl UpperTree {
             node.body.is_none() && (left == leaf || self.nodes[left as usize].skip == leaf)
         };
         // The nearest node before the leaf that has it as a child.
-        let parent = (0..leaf).rev().filter(|i| self.nodes[*i as usize].skip >= end).find(is_parent);
+        let parent =
+            (0..leaf).rev().filter(|i| self.nodes[*i as usize].skip >= end).find(is_parent);
         let shape = (0..self.nodes.len() as u32)
             .filter(|&index| index != leaf && Some(index) != parent)
             .map(|index| self.nodes[index as usize].body)

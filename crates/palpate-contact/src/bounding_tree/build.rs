@@ -136,12 +136,7 @@ fn split_all(
 }
 
 /// Permutes `range` into two parts, neither empty, and returns the length of the first.
-fn split_range(
-    elements: &Elements,
-    centroids: &[Point],
-    range: &mut [u32],
-    split: Split,
-) -> usize {
+fn split_range(elements: &Elements, centroids: &[Point], range: &mut [u32], split: Split) -> usize {
     let bounds = range
         .iter()
         .fold(Aabb::EMPTY, |bounds, &element| bounds.union(&elements.bounds(element as usize)));

@@ -33,11 +33,8 @@ impl BoundingTree {
         point: Point,
         within: f64,
     ) -> Option<SurfacePoint> {
-        let none = SurfacePoint {
-            triangle: u32::MAX,
-            weights: [0.0; 3],
-            distance_squared: f64::INFINITY,
-        };
+        let none =
+            SurfacePoint { triangle: u32::MAX, weights: [0.0; 3], distance_squared: f64::INFINITY };
         let mut search = Search {
             tree: self,
             positions,

@@ -18,7 +18,7 @@ impl Detector for AllPairs {
     fn intersections(
         &mut self,
         frame: &Frame,
-        options: &IntersectionOptions,
+        options: IntersectionOptions,
         found: &mut Intersections,
     ) {
         let start = Instant::now();
@@ -33,7 +33,8 @@ impl Detector for AllPairs {
                 for (triangle_a, &corners_a) in a.mesh.triangles().iter().enumerate() {
                     let points_a = a.triangle(triangle_a as u32);
                     let first = if same { triangle_a + 1 } else { 0 };
-                    for (triangle_b, &corners_b) in b.mesh.triangles().iter().enumerate().skip(first)
+                    for (triangle_b, &corners_b) in
+                        b.mesh.triangles().iter().enumerate().skip(first)
                     {
                         if same && share_a_node(corners_a, corners_b) {
                             continue;
@@ -61,7 +62,10 @@ impl Detector for AllPairs {
         let bodies = frame.bodies;
         for (body_a, a) in bodies.iter().enumerate() {
             for (body_b, b) in bodies.iter().enumerate().skip(body_a) {
-                let Some(distance) = distance(body_a, body_b) else { continue };
+                let Some(distance) = distance(body_a, body_b).filter(|&distance| distance > 0.0)
+                else {
+                    continue;
+                };
                 found.stats.object_pairs += 1;
                 let mut nodes_against_triangles = |from: usize, to: usize| {
                     for &node in bodies[from].mesh.surface_nodes() {

@@ -31,6 +31,8 @@ pub(super) struct Hash {
     entries: Vec<Entry>,
     triangles: Vec<Triangle>,
     large: Vec<u32>,
+    /// Pairs of `triangles` whose boxes meet.
+    candidates: Vec<[u32; 2]>,
     tree: Paper,
 }
 
@@ -51,7 +53,7 @@ struct Entry {
 #[derive(Clone, Copy, Debug)]
 struct Triangle {
     body: u32,
-    triangle: u32,
+    index: u32,
     bounds: Aabb,
     first_cell: [i64; 3],
 }
@@ -72,15 +74,50 @@ impl Detector for Hash {
     fn intersections(
         &mut self,
         frame: &Frame,
-        options: &IntersectionOptions,
+        options: IntersectionOptions,
         found: &mut Intersections,
     ) {
         let start = Instant::now();
-        found.stats.all_pairs = frame.all_pairs(options.self_contact);
-        found.stats.object_pairs =
-            if frame.bodies.is_empty() { 0 } else { 1 };
-        self.collect_triangles(frame);
+        let stats = &mut found.stats;
+        stats.all_pairs = frame.all_pairs(options.self_contact);
+        self.prepare(frame);
         let grid = Grid::new(&frame.upper.bounds(), self.mean_edge);
+        for index in 0..self.triangles.len() as u32 {
+            stats.box_tests += self.insert(&grid, index, options.self_contact);
+        }
+        stats.box_tests += self.pair_large(options.self_contact);
+        stats.cell_entries = self.entries.len() as u64;
+        stats.traversal_time = start.elapsed();
+
+        let testing = Instant::now();
+        for pair in &self.candidates {
+            let pair = pair.map(|index| self.triangles[index as usize]);
+            found.pairs.extend(meeting(frame, pair, &mut stats.polygon_tests));
+        }
+        found.pairs.sort_unstable();
+        stats.polygon_time = testing.elapsed();
+    }
+
+    fn proximity(&mut self, frame: &Frame, distance: DistanceOf, found: &mut Proximity) {
+        self.tree.proximity(frame, distance, found);
+    }
+}
+
+impl Hash {
+    /// Lists the triangles and empties the table.
+    fn prepare(&mut self, frame: &Frame) {
+        self.triangles.clear();
+        for (body, scene_body) in frame.bodies.iter().enumerate() {
+            for index in 0..scene_body.mesh.triangles().len() as u32 {
+                let bounds = Aabb::from_points(&scene_body.triangle(index));
+                self.triangles.push(Triangle {
+                    body: body as u32,
+                    index,
+                    bounds,
+                    first_cell: [0; 3],
+                });
+            }
+        }
         let bucket_count = (4 * self.triangles.len()).next_power_of_two();
         if self.buckets.len() < bucket_count {
             self.buckets.resize(bucket_count, Bucket::default());
@@ -92,146 +129,93 @@ impl Detector for Hash {
         self.stamp += 1;
         self.entries.clear();
         self.large.clear();
-        found.stats.traversal_time = start.elapsed();
-
-        let testing = Instant::now();
-        for index in 0..self.triangles.len() as u32 {
-            self.insert(frame, options, &grid, index, found);
-        }
-        self.test_large(frame, options, found);
-        found.stats.cell_entries = self.entries.len() as u64;
-        found.pairs.sort_unstable();
-        found.stats.polygon_time = testing.elapsed();
+        self.candidates.clear();
     }
 
-    fn proximity(&mut self, frame: &Frame, distance: DistanceOf, found: &mut Proximity) {
-        self.tree.proximity(frame, distance, found);
-    }
-}
-
-impl Hash {
-    fn collect_triangles(&mut self, frame: &Frame) {
-        self.triangles.clear();
-        for (body, scene_body) in frame.bodies.iter().enumerate() {
-            for triangle in 0..scene_body.mesh.triangles().len() as u32 {
-                self.triangles.push(Triangle {
-                    body: body as u32,
-                    triangle,
-                    bounds: Aabb::from_points(&scene_body.triangle(triangle)),
-                    first_cell: [0; 3],
-                });
-            }
-        }
-    }
-
-    /// Puts a triangle into the cells of its box, testing it against those already there.
-    fn insert(
-        &mut self,
-        frame: &Frame,
-        options: &IntersectionOptions,
-        grid: &Grid,
-        index: u32,
-        found: &mut Intersections,
-    ) {
-        let own = self.triangles[index as usize];
+    /// Puts a triangle into the cells of its box and pairs it with those already there; returns the
+    /// number of box tests.
+    fn insert(&mut self, grid: &Grid, index: u32, self_contact: bool) -> u64 {
+        let own = &mut self.triangles[index as usize];
         let (first, last) = (grid.cell(own.bounds.min), grid.cell(own.bounds.max));
-        self.triangles[index as usize].first_cell = first;
+        own.first_cell = first;
         let along = |axis: usize| (last[axis] - first[axis] + 1) as u64;
-        let cells = along(0).saturating_mul(along(1)).saturating_mul(along(2));
-        if cells > MOST_CELLS {
+        if along(0).saturating_mul(along(1)).saturating_mul(along(2)) > MOST_CELLS {
             self.large.push(index);
-            return;
+            return 0;
         }
+        let mut box_tests = 0;
         for x in first[0]..=last[0] {
             for y in first[1]..=last[1] {
                 for z in first[2]..=last[2] {
-                    self.insert_in_cell(frame, options, index, [x, y, z], found);
+                    box_tests += self.insert_in_cell(index, [x, y, z], self_contact);
                 }
             }
         }
+        box_tests
     }
 
-    fn insert_in_cell(
-        &mut self,
-        frame: &Frame,
-        options: &IntersectionOptions,
-        index: u32,
-        cell: [i64; 3],
-        found: &mut Intersections,
-    ) {
+    fn insert_in_cell(&mut self, index: u32, cell: [i64; 3], self_contact: bool) -> u64 {
         let slot = hash(cell) as usize & (self.buckets.len() - 1);
         let bucket = self.buckets[slot];
         let head = if bucket.stamp == self.stamp { bucket.first } else { END };
-        let own = self.triangles[index as usize];
+        let own = &self.triangles[index as usize];
+        let mut box_tests = 0;
         let mut at = head;
         while at != END {
             let entry = self.entries[at as usize];
             at = entry.next;
-            // Other cells fall into the same bucket; and a pair with several cells in common is tested
-            // in the first of them only.
-            let other = self.triangles[entry.triangle as usize];
+            // Other cells fall into the same bucket; and a pair with several cells in common counts in
+            // the first of them only.
+            let other = &self.triangles[entry.triangle as usize];
             let first_common: [i64; 3] =
                 std::array::from_fn(|axis| own.first_cell[axis].max(other.first_cell[axis]));
-            if entry.cell == cell && first_common == cell {
-                test(frame, options, &own, &other, found);
+            let wanted = self_contact || own.body != other.body;
+            if wanted && entry.cell == cell && first_common == cell {
+                box_tests += 1;
+                if own.bounds.intersects(&other.bounds) {
+                    self.candidates.push([entry.triangle, index]);
+                }
             }
         }
         self.buckets[slot] = Bucket { stamp: self.stamp, first: self.entries.len() as u32 };
         self.entries.push(Entry { cell, triangle: index, next: head });
+        box_tests
     }
 
-    /// Tests the triangles that were too large for the cells against all others.
-    fn test_large(
-        &self,
-        frame: &Frame,
-        options: &IntersectionOptions,
-        found: &mut Intersections,
-    ) {
+    /// Pairs the triangles that were too large for the cells with all others.
+    fn pair_large(&mut self, self_contact: bool) -> u64 {
+        let mut box_tests = 0;
         for &large in &self.large {
+            let own = &self.triangles[large as usize];
             for (index, other) in self.triangles.iter().enumerate() {
                 let index = index as u32;
                 // Two large ones once; `large` is ascending.
                 let counted = index <= large && self.large.binary_search(&index).is_ok();
-                if !counted {
-                    test(frame, options, &self.triangles[large as usize], other, found);
+                if counted || (!self_contact && own.body == other.body) {
+                    continue;
+                }
+                box_tests += 1;
+                if own.bounds.intersects(&other.bounds) {
+                    self.candidates.push([large.min(index), large.max(index)]);
                 }
             }
         }
+        box_tests
     }
 }
 
-fn test(
-    frame: &Frame,
-    options: &IntersectionOptions,
-    one: &Triangle,
-    other: &Triangle,
-    found: &mut Intersections,
-) {
-    let same = one.body == other.body;
-    if same && !options.self_contact {
-        return;
+/// The exact test of two triangles, the first before the second.
+fn meeting(frame: &Frame, [a, b]: [Triangle; 2], polygon_tests: &mut u64) -> Option<TrianglePair> {
+    let (body_a, body_b) = (&frame.bodies[a.body as usize], &frame.bodies[b.body as usize]);
+    let corners_a = body_a.mesh.triangles()[a.index as usize];
+    let corners_b = body_b.mesh.triangles()[b.index as usize];
+    if a.body == b.body && share_a_node(corners_a, corners_b) {
+        return None;
     }
-    found.stats.box_tests += 1;
-    if !one.bounds.intersects(&other.bounds) {
-        return;
-    }
-    let in_order = (one.body, one.triangle) < (other.body, other.triangle);
-    let (one, other) = if in_order { (one, other) } else { (other, one) };
-    let (a, b) = (&frame.bodies[one.body as usize], &frame.bodies[other.body as usize]);
-    let corners_a = a.mesh.triangles()[one.triangle as usize];
-    let corners_b = b.mesh.triangles()[other.triangle as usize];
-    if same && share_a_node(corners_a, corners_b) {
-        return;
-    }
-    found.stats.polygon_tests += 1;
-    if triangles_intersect(&a.triangle(one.triangle), &b.triangle(other.triangle)) {
-        found.pairs.push(TrianglePair {
-            body_a: one.body,
-            triangle_a: one.triangle,
-            body_b: other.body,
-            triangle_b: other.triangle,
-        });
-    }
+    *polygon_tests += 1;
+    triangles_intersect(&body_a.triangle(a.index), &body_b.triangle(b.index)).then_some(
+        TrianglePair { body_a: a.body, triangle_a: a.index, body_b: b.body, triangle_b: b.index },
+    )
 }
 
 /// Cells of one size over the scene.

@@ -23,7 +23,7 @@ impl Detector for Paper {
     fn intersections(
         &mut self,
         frame: &Frame,
-        options: &IntersectionOptions,
+        options: IntersectionOptions,
         found: &mut Intersections,
     ) {
         let start = Instant::now();

@@ -1,0 +1,4 @@
+//! Detection against its slow, obvious twins.
+
+mod intersections;
+mod scenes;
