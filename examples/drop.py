@@ -9,8 +9,10 @@ size = np.ptp(organ.nodes, axis=0).max()
 centre = organ.nodes.mean(axis=0)
 lowest = organ.nodes[:, 2].min()
 corners = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]) * 4 * size
-plate = palpate.Mesh(corners + [centre[0], centre[1], lowest - 0.2 * size],
-                     triangles=[[0, 1, 2], [0, 2, 3]])
+plate = palpate.Mesh(
+    corners + np.array([centre[0], centre[1], lowest - 0.2 * size]),
+    triangles=[[0, 1, 2], [0, 2, 3]],
+)
 
 simulation = palpate.Simulation(
     palpate.Model(

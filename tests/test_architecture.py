@@ -12,7 +12,10 @@ ALLOWED = {
     "palpate-contact": {"palpate-geometry", "palpate-model"},
     "palpate-solver": set(),
     "palpate-mechanics": {
-        "palpate-geometry", "palpate-model", "palpate-contact", "palpate-solver",
+        "palpate-geometry",
+        "palpate-model",
+        "palpate-contact",
+        "palpate-solver",
     },
     "palpate": {"palpate-geometry", "palpate-model", "palpate-contact", "palpate-mechanics"},
     "palpate-python": {"palpate"},

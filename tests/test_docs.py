@@ -38,16 +38,25 @@ def test_commands_run(page, tmp_path):
             if not line.startswith("$ palpate"):
                 continue
             # A few frames are enough to see that a command works.
-            command = re.sub(r"(palpate simulate \S+)", r"\1 --duration 0.05 --no-pictures", line[2:])
-            done = subprocess.run(shlex.split(command), cwd=tmp_path, env=environment,
-                                  capture_output=True, text=True, check=False)
+            command = re.sub(
+                r"(palpate simulate \S+)", r"\1 --duration 0.05 --no-pictures", line[2:]
+            )
+            done = subprocess.run(
+                shlex.split(command),
+                cwd=tmp_path,
+                env=environment,
+                capture_output=True,
+                text=True,
+                check=False,
+            )
             assert done.returncode == 0, f"{command}\n{done.stdout}\n{done.stderr}"
 
 
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda example: example.name)
 def test_examples_run(example, tmp_path):
-    done = subprocess.run([sys.executable, str(example)], cwd=tmp_path, capture_output=True,
-                          text=True, check=False)
+    done = subprocess.run(
+        [sys.executable, str(example)], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
     assert done.returncode == 0, done.stderr
 
 

@@ -45,8 +45,11 @@ def test_seg_keeps_sets_and_regions_exactly(tmp_path):
 
 def test_mixed_cells_are_reported(tmp_path):
     meshio = pytest.importorskip("meshio")
-    cells = [("tetra", CUBE_TETRAHEDRA), ("hexahedron", [[0, 4, 6, 2, 1, 5, 7, 3]]),
-             ("line", [[0, 1], [1, 2]])]
+    cells = [
+        ("tetra", CUBE_TETRAHEDRA),
+        ("hexahedron", [[0, 4, 6, 2, 1, 5, 7, 3]]),
+        ("line", [[0, 1], [1, 2]]),
+    ]
     for name in ("mixed.vtk", "mixed.vtu", "mixed.msh"):
         meshio.write(tmp_path / name, meshio.Mesh(CUBE_NODES, cells))
         mesh = palpate.read_mesh(tmp_path / name)
@@ -80,8 +83,10 @@ def test_a_missing_file_is_an_os_error(tmp_path, name):
     assert caught.value.filename == str(tmp_path / name)
 
 
-@pytest.mark.parametrize("name", ["garbage.seg", "garbage.vtk", "garbage.msh", "garbage.vtu",
-                                  "garbage.inp", "garbage.xyz123"])
+@pytest.mark.parametrize(
+    "name",
+    ["garbage.seg", "garbage.vtk", "garbage.msh", "garbage.vtu", "garbage.inp", "garbage.xyz123"],
+)
 def test_garbage_is_a_clear_error(tmp_path, name):
     path = tmp_path / name
     path.write_bytes(b"\x00\xffnot a mesh\n\n12 13 14")
@@ -91,8 +96,9 @@ def test_garbage_is_a_clear_error(tmp_path, name):
 
 def test_inverted_tetrahedra_are_listed_and_repaired(tmp_path):
     path = tmp_path / "inverted.seg"
-    text = "\n".join([
-        "seg 1", "nodes 4", "0 0 0", "1 0 0", "0 1 0", "0 0 1", "tetrahedra 1", "1 0 2 3"])
+    text = "\n".join(
+        ["seg 1", "nodes 4", "0 0 0", "1 0 0", "0 1 0", "0 0 1", "tetrahedra 1", "1 0 2 3"]
+    )
     path.write_text(text + "\n")
     with pytest.raises(palpate.MeshError, match="inverted"):
         palpate.read_mesh(path)

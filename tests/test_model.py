@@ -57,7 +57,8 @@ def test_text_round_trips(write_model):
 
 
 def test_extensions_arrive_in_python(write_model):
-    model = palpate.read_model(write_model("""
+    model = palpate.read_model(
+        write_model("""
         gravity 0,0,-1
         TREE left {
           NE kidney.seg
@@ -68,7 +69,8 @@ def test_extensions_arrive_in_python(write_model):
           IV 1,2,3
           RG { at 0 trans 0,0,0  at 1 trans 0,0,0.5 rot axis 0,0,1 angle 90 }
         }
-    """))
+    """)
+    )
     (body,) = model.bodies
     assert model.gravity == (0.0, 0.0, -1.0)
     assert body.name == "left"
@@ -113,15 +115,17 @@ def test_a_missing_model_lists_the_bundled_ones(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["small", "case1", "case2"])
-def test_bundled_models_load_and_round_trip(name, tmp_path):
+def test_bundled_models_load(name):
     model = palpate.read_model(name)
     assert len(model.bodies) >= 2
     assert all(body.mesh.volume > 0 or body.rigid is not None for body in model.bodies)
+    assert "NE " in model.to_text()
 
 
 def test_a_model_from_arrays(cube):
-    floor = palpate.Mesh([[-5, -5, -1], [5, -5, -1], [5, 5, -1], [-5, 5, -1]],
-                         triangles=[[0, 1, 2], [0, 2, 3]])
+    floor = palpate.Mesh(
+        [[-5, -5, -1], [5, -5, -1], [5, 5, -1], [-5, 5, -1]], triangles=[[0, 1, 2], [0, 2, 3]]
+    )
     model = palpate.Model(
         [cube, palpate.Body(floor, name="floor", rigid=()), cube], gravity=(0, 0, -2)
     )
@@ -131,19 +135,22 @@ def test_a_model_from_arrays(cube):
         model.to_text()
 
 
-@pytest.mark.parametrize(("body", "text"), [
-    ({"material": palpate.Material(poisson=0.5)}, "poisson"),
-    ({"material": palpate.Material(young=-1.0)}, "young"),
-    ({"material": palpate.Material(density=float("nan"))}, "density"),
-    ({"material": palpate.Material(law="rubber")}, "rubber"),
-    ({"contact": palpate.Contact(friction=-1.0)}, "friction"),
-    ({"contact": palpate.Contact(distance=0.0)}, "distance"),
-    ({"fixed_nodes": [8]}, "fixed"),
-    ({"fixed_nodes": [-1]}, "fixed_nodes"),
-    ({"opacity": 2.0}, "opacity"),
-    ({"rigid": [palpate.RigidKey(1.0), palpate.RigidKey(1.0)]}, "time"),
-    ({"initial_velocity": (0, 0)}, "initial_velocity"),
-])
+@pytest.mark.parametrize(
+    ("body", "text"),
+    [
+        ({"material": palpate.Material(poisson=0.5)}, "poisson"),
+        ({"material": palpate.Material(young=-1.0)}, "young"),
+        ({"material": palpate.Material(density=float("nan"))}, "density"),
+        ({"material": palpate.Material(law="rubber")}, "rubber"),
+        ({"contact": palpate.Contact(friction=-1.0)}, "friction"),
+        ({"contact": palpate.Contact(distance=0.0)}, "distance"),
+        ({"fixed_nodes": [8]}, "fixed"),
+        ({"fixed_nodes": [-1]}, "fixed_nodes"),
+        ({"opacity": 2.0}, "opacity"),
+        ({"rigid": [palpate.RigidKey(1.0), palpate.RigidKey(1.0)]}, "time"),
+        ({"initial_velocity": (0, 0)}, "initial_velocity"),
+    ],
+)
 def test_bad_bodies_are_refused_by_name(cube, body, text):
     with pytest.raises(ValueError, match=text):
         palpate.Model([palpate.Body(cube, name="left", **body)])

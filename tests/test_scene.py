@@ -117,13 +117,16 @@ def test_bad_positions_leave_the_scene_as_it_was(cube, positions, error, text):
     assert np.array_equal(scene.positions(0), cube.nodes)
 
 
-@pytest.mark.parametrize(("options", "error", "text"), [
-    ({"leaf_size": 0}, ValueError, "leaf_size"),
-    ({"leaf_size": 1.5}, TypeError, "leaf_size"),
-    ({"method": "magic"}, ValueError, "method: expected one of paper"),
-    ({"split": "best"}, ValueError, "split"),
-    ({"threads": 0}, ValueError, "threads"),
-])
+@pytest.mark.parametrize(
+    ("options", "error", "text"),
+    [
+        ({"leaf_size": 0}, ValueError, "leaf_size"),
+        ({"leaf_size": 1.5}, TypeError, "leaf_size"),
+        ({"method": "magic"}, ValueError, "method: expected one of paper"),
+        ({"split": "best"}, ValueError, "split"),
+        ({"threads": 0}, ValueError, "threads"),
+    ],
+)
 def test_bad_options_are_refused_by_name(cube, options, error, text):
     with pytest.raises(error, match=text):
         palpate.Scene([cube], **options)
@@ -158,8 +161,14 @@ def test_two_threads_may_use_one_scene(make_box):
 
 
 @settings(max_examples=60, deadline=None)
-@given(st.integers(0, 2**32 - 1), st.sampled_from([1, 2, 7]), st.sampled_from(["paper", "hash"]),
-       st.sampled_from([0.0, 0.5, 1e8]), st.sampled_from([1e-9, 1.0, 1e9]), st.booleans())
+@given(
+    st.integers(0, 2**32 - 1),
+    st.sampled_from([1, 2, 7]),
+    st.sampled_from(["paper", "hash"]),
+    st.sampled_from([0.0, 0.5, 1e8]),
+    st.sampled_from([1e-9, 1.0, 1e9]),
+    st.booleans(),
+)
 def test_any_scene_gives_the_pairs_of_the_double_loop(seed, leaf_size, method, offset, scale, grid):
     rng = np.random.default_rng(seed)
     from conftest import box

@@ -11,8 +11,9 @@ def falling(make_box):
     """A soft box above a rigid plate."""
     soft = palpate.Body(make_box((3, 3, 3), size=0.1, origin=(0, 0, 0.004)), name="soft")
     plate = palpate.Body(
-        palpate.Mesh([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]],
-                     triangles=[[0, 1, 2], [0, 2, 3]]),
+        palpate.Mesh(
+            [[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], triangles=[[0, 1, 2], [0, 2, 3]]
+        ),
         name="plate",
         rigid=(),
     )
@@ -97,8 +98,14 @@ def test_damaged_checkpoints_are_refused(falling, tmp_path):
     path = tmp_path / "run.palpate"
     palpate.Simulation(falling).save(path)
     whole = path.read_bytes()
-    for broken in (b"", b"hello", whole[:-1], whole[:20], whole + b"x",
-                   whole[:100] + bytes([whole[100] ^ 1]) + whole[101:]):
+    for broken in (
+        b"",
+        b"hello",
+        whole[:-1],
+        whole[:20],
+        whole + b"x",
+        whole[:100] + bytes([whole[100] ^ 1]) + whole[101:],
+    ):
         path.write_bytes(broken)
         with pytest.raises(palpate.CheckpointError, match=r"run\.palpate"):
             palpate.Simulation.load(path)
@@ -123,10 +130,15 @@ def test_forces_and_velocities_can_be_set(make_box):
     assert np.array_equal(simulation.positions[0], moved)
 
 
-@pytest.mark.parametrize(("values", "error"), [
-    (np.zeros((3, 3)), ValueError), (np.full((27, 3), np.nan), ValueError),
-    (np.zeros((27, 3), complex), TypeError), ("x", (TypeError, ValueError)),
-])
+@pytest.mark.parametrize(
+    ("values", "error"),
+    [
+        (np.zeros((3, 3)), ValueError),
+        (np.full((27, 3), np.nan), ValueError),
+        (np.zeros((27, 3), complex), TypeError),
+        ("x", (TypeError, ValueError)),
+    ],
+)
 def test_bad_values_change_nothing(make_box, values, error):
     simulation = palpate.Simulation([make_box((2, 2, 2))])
     before = simulation.positions[0]
@@ -136,13 +148,16 @@ def test_bad_values_change_nothing(make_box, values, error):
     assert np.array_equal(simulation.positions[0], before)
 
 
-@pytest.mark.parametrize(("options", "error", "text"), [
-    ({"time_step": 0.0}, ValueError, "time_step"),
-    ({"time_step": float("nan")}, ValueError, "time_step"),
-    ({"time_step": "fast"}, TypeError, "time_step"),
-    ({"threads": 0}, ValueError, "threads"),
-    ({"method": "none"}, ValueError, "method"),
-])
+@pytest.mark.parametrize(
+    ("options", "error", "text"),
+    [
+        ({"time_step": 0.0}, ValueError, "time_step"),
+        ({"time_step": float("nan")}, ValueError, "time_step"),
+        ({"time_step": "fast"}, TypeError, "time_step"),
+        ({"threads": 0}, ValueError, "threads"),
+        ({"method": "none"}, ValueError, "method"),
+    ],
+)
 def test_bad_options_are_refused_by_name(cube, options, error, text):
     with pytest.raises(error, match=text):
         palpate.Simulation([cube], **options)
@@ -163,8 +178,11 @@ def test_steps_are_counted(cube):
 
 def test_two_soft_boxes_collide_and_keep_their_momentum(make_box):
     left = palpate.Body(make_box((2, 2, 2), size=0.1), initial_velocity=(0.5, 0, 0), name="left")
-    right = palpate.Body(make_box((2, 2, 2), size=0.1, origin=(0.12, 0.02, 0.01)),
-                         initial_velocity=(-0.5, 0, 0), name="right")
+    right = palpate.Body(
+        make_box((2, 2, 2), size=0.1, origin=(0.12, 0.02, 0.01)),
+        initial_velocity=(-0.5, 0, 0),
+        name="right",
+    )
     simulation = palpate.Simulation(palpate.Model([left, right], gravity=(0, 0, 0)))
     touched = sum(simulation.step().contacts > 0 for _ in range(60))
     assert touched > 0

@@ -22,7 +22,7 @@ def _as_array(value: Any, name: str, expected: str) -> npt.NDArray[Any]:
 
 
 def points(value: Any, name: str, count: int | None = None) -> Float64Array:
-    """``value`` as a C-contiguous float64 array of shape (n, 3); no copy where it already is one."""
+    """``value`` as a C-contiguous float64 array of shape (n, 3), copied only if it is not one."""
     rows = "n" if count is None else str(count)
     expected = f"numbers of shape ({rows}, 3)"
     array = _as_array(value, name, expected)

@@ -15,7 +15,7 @@ _Quaternion = tuple[float, float, float, float]
 _Material = tuple[str, float, float, float, float, float]
 _Contact = tuple[float, float | None, float | None, bool]
 _Key = tuple[float, _Vec3, _Quaternion]
-_Stats = tuple[float, float, float, int, int, int, int, int]
+_Stats = tuple[float, float, float, int, int, int, int, int, int]
 
 __version__: str
 
@@ -54,6 +54,7 @@ class Mesh:
 
 def read_mesh_file(path: str | os.PathLike[str], repair: bool) -> tuple[Mesh, list[str]]: ...
 def write_mesh_file(path: str | os.PathLike[str], mesh: Mesh) -> None: ...
+
 @final
 class Body:
     def __new__(
@@ -111,6 +112,7 @@ def load_model(
     path: str | os.PathLike[str], loader: Callable[[str], tuple[Mesh, list[str]]]
 ) -> Model: ...
 def format_model(text: str, path: str | os.PathLike[str]) -> str: ...
+
 @final
 class Scene:
     def __new__(

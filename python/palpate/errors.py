@@ -1,4 +1,4 @@
-"""What palpate raises. Bad arguments raise ``ValueError`` or ``TypeError`` as everywhere in Python."""
+"""What palpate raises beside the ``ValueError`` and ``TypeError`` that bad arguments raise."""
 
 from __future__ import annotations
 

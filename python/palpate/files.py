@@ -84,7 +84,7 @@ def _read_with_meshio(path: Path, repair: bool) -> Mesh:
         raw = meshio.read(path)
     except SystemExit:  # meshio ends the process on some unknown formats
         raise MeshError(f"{path}: not a mesh that meshio can read", str(path)) from None
-    except Exception as error:  # noqa: BLE001 - meshio's readers raise anything on a bad file
+    except Exception as error:
         raise MeshError(f"{path}: meshio cannot read it: {error}", str(path)) from error
     try:
         return _from_meshio(raw, repair)
@@ -115,10 +115,14 @@ def _from_meshio(raw: Any, repair: bool) -> Mesh:
         raise MeshError(f"no tetrahedra and no triangles in it (found: {found})")
     notes.extend(f"{total} {kind} cells left out" for kind, total in sorted(left_out.items()))
     elements = np.concatenate(cells)
-    points, elements, merged = _merge_equal_points(points, elements) if not solid else (
-        points,
-        elements,
-        0,
+    points, elements, merged = (
+        _merge_equal_points(points, elements)
+        if not solid
+        else (
+            points,
+            elements,
+            0,
+        )
     )
     if merged:
         notes.append(f"{merged} points at equal positions merged")
@@ -201,7 +205,7 @@ def _write_with_meshio(path: Path, mesh: Mesh) -> None:
             meshio.write(Path(folder) / path.name, raw)
         except SystemExit:
             raise MeshError(f"{path}: meshio cannot write this format", str(path)) from None
-        except Exception as error:  # noqa: BLE001
+        except Exception as error:
             raise MeshError(f"{path}: meshio cannot write it: {error}", str(path)) from error
         for part in sorted(Path(folder).iterdir()):
             part.replace(path.parent / part.name)

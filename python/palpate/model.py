@@ -93,7 +93,7 @@ class Body:
             _arrays.indices(self.fixed_nodes, f"body {self.name!r}: fixed_nodes", None),
             None
             if self.rigid is None
-            else [(key.time, tuple(key.translation), tuple(key.rotation)) for key in self.rigid],
+            else [(key.time, key.translation, key.rotation) for key in self.rigid],
             (c.friction, c.distance, c.stiffness, c.self_contact),
             self.processor,
             _arrays.vector(self.initial_velocity, f"body {self.name!r}: initial_velocity"),
@@ -270,5 +270,3 @@ def read_model(path: str | os.PathLike[str], *, repair: bool = False) -> Model:
         return mesh._core, list(mesh.notes)
 
     return Model._from_core(_core.load_model(str(find_model(path)), load))
-
-

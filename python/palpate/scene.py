@@ -36,6 +36,7 @@ class DetectionStats:
     polygon_time: float
     object_pairs: int
     nodes_visited: int
+    leaf_pairs: int
     box_tests: int
     pair_tests: int
     all_pairs: int
@@ -102,7 +103,7 @@ class Scene:
 
     def __init__(
         self,
-        bodies: Model | str | os.PathLike[str] | Mesh | Iterable[Mesh | Body] = (),
+        bodies: Model | str | os.PathLike[str] | Mesh | Iterable[Mesh | Body],
         *,
         leaf_size: int | None = None,
         split: str = "middle",
@@ -219,16 +220,15 @@ def split_positions(
 ) -> list[Float64Array]:
     """One (n, 3) array per body from a sequence of them or from a stacked (N, 3) array."""
     total = sum(counts)
-    stacked = isinstance(positions, np.ndarray) and positions.ndim == 2
-    if not stacked and not isinstance(positions, (list, tuple)):
+    if isinstance(positions, np.ndarray) and positions.ndim == 2:
+        array = _arrays.points(positions, "positions", total)
+        ends = np.cumsum(counts)
+        return [array[end - count : end] for end, count in zip(ends, counts, strict=True)]
+    if not isinstance(positions, (list, tuple)):
         raise TypeError(
             "positions: expected a sequence of (n, 3) arrays or one stacked array of shape "
             f"({total}, 3), got {_describe(positions)}"
         )
-    if stacked:
-        array = _arrays.points(positions, "positions", total)
-        ends = np.cumsum(counts)
-        return [array[end - count : end] for end, count in zip(ends, counts, strict=True)]
     if len(positions) != len(counts):
         raise ValueError(
             f"positions: expected {len(counts)} arrays, one per body, got {len(positions)}"
@@ -272,7 +272,8 @@ def _scene_parts(bodies: Any) -> tuple[list[Mesh], list[str], Any]:
         meshes = [body.mesh for body in bodies.bodies]
         return meshes, [body.name for body in bodies.bodies], bodies._core.structure
     items = [bodies] if isinstance(bodies, (Mesh, Body)) else list(bodies)
-    meshes, names = [], []
+    meshes: list[Mesh] = []
+    names: list[str] = []
     for index, item in enumerate(items):
         mesh = item.mesh if isinstance(item, Body) else as_mesh(item, f"bodies[{index}]")
         name = item.name if isinstance(item, Body) else f"body_{index + 1}"

@@ -216,9 +216,7 @@ class Simulation:
             If the file is damaged or not a checkpoint.
         """
         simulation = cls.__new__(cls)
-        simulation._start(
-            _core.Simulation.load(os.fspath(path), _arrays.count(threads, "threads"))
-        )
+        simulation._start(_core.Simulation.load(os.fspath(path), _arrays.count(threads, "threads")))
         return simulation
 
     def _index(self, body: int | str) -> int:

@@ -17,7 +17,7 @@ use crate::mesh::PyMesh;
 use crate::model::structure_from_python;
 
 /// Times [s] and counts of a query, in the order of `palpate.DetectionStats`.
-pub(crate) type StatsRow = (f64, f64, f64, usize, u64, u64, u64, u64);
+pub(crate) type StatsRow = (f64, f64, f64, u64, u64, u64, u64, u64, u64);
 
 /// Bodies and their bounding trees. The lock lets two Python threads use one scene in turn.
 #[pyclass(frozen, name = "Scene", module = "palpate._core")]
@@ -110,12 +110,13 @@ impl PyScene {
         let stats = tree.stats();
         let row = PyDict::new(py);
         row.set_item("elements", stats.element_count)?;
+        row.set_item("triangles", stats.triangle_count)?;
+        row.set_item("expected_nodes", stats.expected_node_count)?;
         row.set_item("nodes", stats.node_count)?;
         row.set_item("leaves", stats.leaf_count)?;
-        row.set_item("empty_leaves", stats.empty_leaf_count)?;
         row.set_item("depth_max", stats.depth_max)?;
         row.set_item("depth_mean", stats.depth_mean)?;
-        row.set_item("leaf_size", stats.leaf_size)?;
+        row.set_item("leaf_size", tree.leaf_size())?;
         row.set_item("leaf_fill", stats.leaf_fill.clone())?;
         Ok(row)
     }
@@ -127,10 +128,11 @@ pub(crate) fn stats_row(stats: &DetectionStats) -> StatsRow {
         stats.object_time.as_secs_f64(),
         stats.traversal_time.as_secs_f64(),
         stats.polygon_time.as_secs_f64(),
-        stats.object_pairs as usize,
+        stats.object_pairs,
         stats.nodes_visited,
+        stats.leaf_pairs,
         stats.box_tests,
-        stats.pair_tests,
+        stats.polygon_tests,
         stats.all_pairs,
     )
 }
