@@ -1,11 +1,14 @@
 //! Object data (tetrahedral meshes and their files), the model language and the model it describes.
 
 pub mod body;
+pub mod files;
 pub mod mesh;
+mod number;
 
 pub use body::{
     Appearance, Body, ContactSettings, Law, Material, Model, Pose, RigidKey, RigidMotion, Structure,
 };
+pub use files::{FileError, FileErrorCause, ReadMesh, ReadOptions, read_mesh, write_mesh};
 pub use mesh::{
     Defect, DefectKind, ElementKind, Indices, Mesh, MeshData, MeshError, NONE, NodeTriangles,
     QualitySummary, RepairReport, TETRAHEDRON_FACES,

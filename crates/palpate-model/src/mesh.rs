@@ -20,7 +20,7 @@ pub use measure::QualitySummary;
 pub use surface::TETRAHEDRON_FACES;
 
 pub(crate) use check::drop_unused_nodes;
-pub(crate) use error::Place;
+pub(crate) use error::{Place, counted};
 
 /// Marks "no tetrahedron" or "no triangle" in index arrays.
 pub const NONE: u32 = u32::MAX;

@@ -1,0 +1,219 @@
+//! Object data on disk: `.seg` and legacy `.vtk`, by extension.
+
+mod seg;
+mod tokens;
+mod vtk;
+
+use std::ffi::OsStr;
+use std::fs::{self, File};
+use std::io::{self, BufWriter, Read, Write};
+use std::path::{Path, PathBuf};
+
+use crate::mesh::{Mesh, MeshData, MeshError, Place};
+use tokens::ReadError;
+
+pub use vtk::{VtkEncoding, write_vtk};
+
+/// How a mesh file is read.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ReadOptions {
+    /// Mend what can be mended ([`Mesh::repaired`]) instead of refusing it.
+    pub repair: bool,
+}
+
+/// A mesh from a file, and what the reader has to say about it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ReadMesh {
+    /// The mesh, in the file's own unit of length.
+    pub mesh: Mesh,
+    /// What was left out, converted or repaired, one sentence each.
+    pub notes: Vec<String>,
+}
+
+/// Why a mesh file could not be read or written: file, line where the format has lines, and cause.
+#[derive(Debug)]
+pub struct FileError {
+    path: PathBuf,
+    line: Option<usize>,
+    cause: FileErrorCause,
+}
+
+/// What is wrong with a file.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum FileErrorCause {
+    /// The operating system refused.
+    #[error("{0}")]
+    Io(#[from] io::Error),
+    /// The text is not in the format.
+    #[error("{0}")]
+    Syntax(String),
+    /// The arrays do not make a mesh.
+    #[error("{0}")]
+    Mesh(#[from] MeshError),
+    /// The extension belongs to no format that is known here.
+    #[error(
+        "{} is no mesh format known here; this reads and writes .seg and legacy .vtk, the Python \
+         package converts others",
+        if .0.is_empty() { "a name without extension".to_owned() } else { format!(".{}", .0) }
+    )]
+    UnknownFormat(String),
+}
+
+impl FileError {
+    /// The file.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// The line, from 1, where the format has lines and the error has a place.
+    pub fn line(&self) -> Option<usize> {
+        self.line
+    }
+
+    /// What is wrong.
+    pub fn cause(&self) -> &FileErrorCause {
+        &self.cause
+    }
+}
+
+impl std::fmt::Display for FileError {
+    /// `kidney.seg:17: tetrahedron 3: node index 99 is out of range (the mesh has 20 nodes)`.
+    fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(out, "{}:", self.path.display())?;
+        if let Some(line) = self.line {
+            write!(out, "{line}:")?;
+        }
+        write!(out, " {}", self.cause)
+    }
+}
+
+impl std::error::Error for FileError {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        Some(&self.cause)
+    }
+}
+
+/// What a reader hands over.
+struct Parsed {
+    data: MeshData,
+    notes: Vec<String>,
+    /// Line of the node or element that was asked for.
+    sought_line: Option<usize>,
+}
+
+struct ParseFailure {
+    line: Option<usize>,
+    error: ReadError,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Format {
+    Seg,
+    Vtk,
+}
+
+impl Format {
+    fn of(path: &Path) -> Result<Self, FileErrorCause> {
+        let extension = path.extension().and_then(OsStr::to_str).unwrap_or_default();
+        match extension.to_ascii_lowercase().as_str() {
+            "seg" => Ok(Self::Seg),
+            "vtk" => Ok(Self::Vtk),
+            _ => Err(FileErrorCause::UnknownFormat(extension.to_owned())),
+        }
+    }
+
+    fn parse(
+        self,
+        reader: impl Read,
+        size: u64,
+        sought: Option<Place>,
+    ) -> Result<Parsed, ParseFailure> {
+        match self {
+            Self::Seg => seg::read(reader, size, sought),
+            Self::Vtk => vtk::read(reader, size, sought),
+        }
+    }
+}
+
+/// Reads a mesh file, streaming; `.seg` or legacy `.vtk` by its extension.
+///
+/// # Errors
+/// If the file cannot be read, is not in its format, or does not describe a mesh.
+pub fn read_mesh(path: &Path, options: &ReadOptions) -> Result<ReadMesh, FileError> {
+    let fail = |line, cause| FileError { path: path.to_owned(), line, cause };
+    let format = Format::of(path).map_err(|cause| fail(None, cause))?;
+    let parse = |sought| {
+        let open = || -> io::Result<(File, u64)> {
+            let file = File::open(path)?;
+            let size = file.metadata()?.len();
+            Ok((file, size))
+        };
+        let (file, size) =
+            open().map_err(|error| ParseFailure { line: None, error: error.into() })?;
+        format.parse(file, size, sought)
+    };
+    let parsed = parse(None).map_err(|failure| match failure.error {
+        ReadError::Io(error) => fail(None, error.into()),
+        ReadError::Syntax(message) => fail(failure.line, FileErrorCause::Syntax(message)),
+    })?;
+    build(parsed, *options).map_err(|error| {
+        // Only a file that is wrong pays for finding the line: it is read again.
+        let line = error.place().and_then(|place| parse(Some(place)).ok()?.sought_line);
+        fail(line, error.into())
+    })
+}
+
+fn build(parsed: Parsed, options: ReadOptions) -> Result<ReadMesh, MeshError> {
+    let mut notes = parsed.notes;
+    let mesh = if options.repair {
+        let (mesh, report) = Mesh::repaired(parsed.data)?;
+        notes.extend(report.lines());
+        mesh
+    } else {
+        Mesh::new(parsed.data)?
+    };
+    Ok(ReadMesh { mesh, notes })
+}
+
+/// Writes a mesh file; `.seg` or binary legacy `.vtk` by its extension.
+///
+/// The file appears under its name when it is complete, never half written. `.seg` keeps everything;
+/// `.vtk` keeps no node sets.
+///
+/// # Errors
+/// If the extension is unknown, the file cannot be written, or a node set's name cannot be.
+pub fn write_mesh(path: &Path, mesh: &Mesh) -> Result<(), FileError> {
+    let fail = |cause| FileError { path: path.to_owned(), line: None, cause };
+    match Format::of(path).map_err(fail)? {
+        Format::Seg => {
+            seg::check_names(mesh).map_err(|message| fail(FileErrorCause::Syntax(message)))?;
+            write_atomically(path, |out| seg::write(out, mesh))
+        }
+        Format::Vtk => write_vtk(path, mesh, VtkEncoding::Binary),
+    }
+}
+
+/// Writes beside `path` and renames, so that a file under that name is always complete.
+fn write_atomically(
+    path: &Path,
+    write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+) -> Result<(), FileError> {
+    let mut name = path.file_name().unwrap_or_default().to_owned();
+    name.push(format!(".{}.part", std::process::id()));
+    let part = path.with_file_name(name);
+    let result = (|| {
+        let mut out = BufWriter::new(File::create(&part)?);
+        write(&mut out)?;
+        out.into_inner().map_err(io::IntoInnerError::into_error)?.sync_all()?;
+        fs::rename(&part, path)
+    })();
+    result.map_err(|error| {
+        // The first error is the one to tell; a leftover that cannot be removed changes nothing.
+        let _ = fs::remove_file(&part);
+        FileError { path: path.to_owned(), line: None, cause: error.into() }
+    })
+}
+
+#[cfg(test)]
+mod fuzz;
