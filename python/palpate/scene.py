@@ -269,8 +269,8 @@ def _scene_parts(bodies: Any) -> tuple[list[Mesh], list[str], Any]:
     if isinstance(bodies, (str, os.PathLike)):
         bodies = read_model(bodies)
     if isinstance(bodies, Model):
-        meshes = [body.mesh for body in bodies.bodies]
-        return meshes, [body.name for body in bodies.bodies], bodies._core.structure
+        placed = [body.mesh for body in bodies.bodies]
+        return placed, [body.name for body in bodies.bodies], bodies._core.structure
     items = [bodies] if isinstance(bodies, (Mesh, Body)) else list(bodies)
     meshes: list[Mesh] = []
     names: list[str] = []

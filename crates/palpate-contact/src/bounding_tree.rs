@@ -14,7 +14,9 @@ pub use validate::TreeDefect;
 pub(crate) use winding::Side;
 
 /// Where a box that holds too many tetrahedra is split, along its longest axis.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, Hash, serde::Deserialize, serde::Serialize,
+)]
 pub enum Split {
     /// At the middle of the box, by centroid; by count where one side would be empty.
     #[default]

@@ -12,7 +12,9 @@ use crate::scene::{Frame, IntersectionOptions, Intersections, Proximity, SceneBo
 pub(crate) use paper::meeting_triangles;
 
 /// How touching surface elements are found. All give the same pairs.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, Hash, serde::Deserialize, serde::Serialize,
+)]
 #[non_exhaustive]
 pub enum Method {
     /// The paper's bounding trees: bodies, then leaves against subtrees, then polygons.

@@ -24,7 +24,7 @@ pub use results::{
 };
 
 /// How a scene is built and searched.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize, serde::Serialize)]
 pub struct SceneOptions {
     /// Most tetrahedra in a leaf: the paper's K.
     pub leaf_size: usize,
