@@ -6,8 +6,8 @@ use palpate_model::mesh::NONE;
 
 /// Fixed facts of a surface.
 ///
-/// Each node and edge is owned by the first triangle (in tree order) that has it, so that a pair of
-/// features is met in exactly one pair of triangles.
+/// Each node and edge is owned by the first triangle that has it, in the mesh's order, so that a pair of
+/// features is met in exactly one pair of triangles, and nothing depends on the tree.
 #[derive(Clone, Debug)]
 pub(crate) struct Surface {
     /// Per triangle, in tree order: bit i set when it owns its node i, bit 3 + i its edge i (ab, bc, ca).
@@ -24,25 +24,23 @@ impl Surface {
     pub(crate) fn new(mesh: &Mesh, triangle_order: &[u32]) -> Self {
         let mut node_seen = vec![false; mesh.nodes().len()];
         let mut edge_owners = vec![NONE; mesh.surface_edges().len()];
-        let owned = triangle_order
-            .iter()
-            .map(|&triangle| {
-                let nodes = mesh.triangles()[triangle as usize];
-                let edges = mesh.triangle_edges()[triangle as usize];
-                let mut bits = 0;
-                for i in 0..3 {
-                    if !std::mem::replace(&mut node_seen[nodes[i] as usize], true) {
-                        bits |= 1 << i;
-                    }
-                    let owner = &mut edge_owners[edges[i] as usize];
-                    if *owner == NONE {
-                        *owner = triangle;
-                        bits |= 8 << i;
-                    }
+        let mut owned_by_triangle = Vec::with_capacity(triangle_order.len());
+        for (triangle, nodes) in mesh.triangles().iter().enumerate() {
+            let edges = mesh.triangle_edges()[triangle];
+            let mut bits = 0_u8;
+            for i in 0..3 {
+                if !std::mem::replace(&mut node_seen[nodes[i] as usize], true) {
+                    bits |= 1 << i;
                 }
-                bits
-            })
-            .collect();
+                let owner = &mut edge_owners[edges[i] as usize];
+                if *owner == NONE {
+                    *owner = triangle as u32;
+                    bits |= 8 << i;
+                }
+            }
+            owned_by_triangle.push(bits);
+        }
+        let owned = triangle_order.iter().map(|&t| owned_by_triangle[t as usize]).collect();
         let mut components = Vec::new();
         join_nodes(mesh, &mut components, |_| true);
         Self { owned, edge_owners, closed: is_closed(mesh), components }

@@ -1,6 +1,6 @@
 //! Inside or outside, exactly: how often the surface winds around a point.
 
-use palpate_geometry::{Point, predicates};
+use palpate_geometry::{Point, predicates, triangles_intersect};
 
 use super::{BoundingTree, corner_points};
 
@@ -35,25 +35,21 @@ impl BoundingTree {
                 continue;
             }
             for position in node.triangles[0]..node.triangles[1] {
-                match crossing(&corner_points(positions, self.corners(position)), point) {
-                    Crossing::Signed(sign) => winding += sign,
-                    Crossing::AtPoint => return Side::OnSurface,
+                let triangle = corner_points(positions, self.corners(position));
+                let near = self.triangle_bounds(position).contains(point);
+                if near && triangles_intersect(&[*point; 3], &triangle) {
+                    return Side::OnSurface;
                 }
+                winding += crossing(&triangle, point);
             }
         }
         if winding == 0 { Side::Outside } else { Side::Inside }
     }
 }
 
-enum Crossing {
-    /// +1 where the ray leaves through the triangle's front, -1 where it enters, 0 where it misses.
-    Signed(i32),
-    /// The point lies on the triangle.
-    AtPoint,
-}
-
-/// Crossing of the ray from `point` along +x with a triangle.
-fn crossing(triangle: &[Point; 3], point: &Point) -> Crossing {
+/// Crossing of the ray from `point` along +x with a triangle that does not hold the point: +1 where the
+/// ray leaves through its front, -1 where it enters, 0 where it misses.
+fn crossing(triangle: &[Point; 3], point: &Point) -> i32 {
     let above = triangle.map(|corner| corner[2] > point[2]);
     // Turning number of the projected triangle around the point: each edge that passes the line
     // z = point z at larger y counts, upwards positive.
@@ -70,16 +66,13 @@ fn crossing(triangle: &[Point; 3], point: &Point) -> Crossing {
         }
     }
     if turns == 0 {
-        return Crossing::Signed(0);
+        return 0;
     }
     let [a, b, c] = *triangle;
     // Seen along +x the triangle comes after the point when the point is behind a front that faces +x,
     // or before a front that faces -x.
-    match predicates::orient3d(a, b, c, *point) {
-        0 => Crossing::AtPoint,
-        side if (side < 0) == (turns > 0) => Crossing::Signed(turns),
-        _ => Crossing::Signed(0),
-    }
+    let behind = predicates::orient3d(a, b, c, *point) < 0;
+    if behind == (turns > 0) { turns } else { 0 }
 }
 
 /// Whether the edge from `lower` to `upper` (by z) passes the point's height at a larger y.

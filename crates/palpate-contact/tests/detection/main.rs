@@ -1,4 +1,8 @@
 //! Detection against its slow, obvious twins.
 
 mod intersections;
+mod penetration;
+mod proximity;
+mod scene;
 mod scenes;
+mod tree;

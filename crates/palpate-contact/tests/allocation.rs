@@ -1,0 +1,71 @@
+//! At steady state a frame allocates nothing: counted by the allocator of this test binary.
+
+#[path = "detection/scenes.rs"]
+#[expect(dead_code, reason = "the other tests use the rest")]
+mod scenes;
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use palpate_contact::{IntersectionOptions, Method, Scene, SceneOptions};
+
+use scenes::{Random, as_slices, deforming, horseshoe, jittered, soup};
+
+struct Counting;
+
+static ALLOCATIONS: AtomicUsize = AtomicUsize::new(0);
+
+#[expect(unsafe_code, reason = "an allocator cannot be written without")]
+// SAFETY: every call is handed to the system allocator unchanged.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
+        // SAFETY: the caller keeps the contract of `GlobalAlloc::alloc`.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        // SAFETY: the caller keeps the contract of `GlobalAlloc::dealloc`.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+
+    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, new_size: usize) -> *mut u8 {
+        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
+        // SAFETY: the caller keeps the contract of `GlobalAlloc::realloc`.
+        unsafe { System.realloc(pointer, layout, new_size) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+#[test]
+fn a_frame_allocates_nothing() {
+    let mut random = Random(4);
+    let meshes = vec![
+        horseshoe(20, 2, [0.0; 3]),
+        jittered([5, 5, 5], [0.0, 2.0, 2.0], 0.1, &mut random),
+        soup(60, 4.0, &mut random),
+    ];
+    let case = deforming(meshes, 3, &mut random);
+    let frames: Vec<_> = case.frames.iter().map(as_slices).collect();
+    for method in Method::ALL {
+        let options = SceneOptions { method, ..SceneOptions::default() };
+        let mut scene = Scene::new(case.meshes.clone(), None, options).expect("three meshes");
+        let mut found = [0; 3];
+        let mut round = |scene: &mut Scene| {
+            for frame in &frames {
+                scene.update(frame).expect("finite positions");
+                found[0] += scene.intersections(&IntersectionOptions::default()).pairs.len();
+                found[1] += scene.proximity(&|_, _| Some(0.1)).pairs.len();
+                found[2] += scene.penetration(&|_, _| true).nodes.len();
+                scene.closest_point(0, [0.0; 3], 1.0);
+            }
+        };
+        round(&mut scene);
+        let before = ALLOCATIONS.load(Ordering::Relaxed);
+        round(&mut scene);
+        assert_eq!(ALLOCATIONS.load(Ordering::Relaxed) - before, 0, "{method:?}");
+        assert!(found.iter().all(|&count| count > 0), "{found:?}");
+    }
+}

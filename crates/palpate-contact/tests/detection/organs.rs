@@ -1,0 +1,2 @@
+//! The natural pose of real organs, where their meshes are at hand (`PALPATE_DATA`).
+
