@@ -1,6 +1,7 @@
 //! Detection against its slow, obvious twins.
 
 mod intersections;
+mod organs;
 mod penetration;
 mod proximity;
 mod scene;
