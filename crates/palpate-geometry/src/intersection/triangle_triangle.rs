@@ -32,36 +32,58 @@ pub fn triangles_intersect(a: &[Point; 3], b: &[Point; 3]) -> bool {
     // Both have an area and their planes cross in a line. Each triangle cuts an interval from it.
     // Corners are renamed so that p is above the other's plane, q and r below (one of the sides
     // strictly); p then sees its interval between the edges pq and pr. Turning a triangle over
-    // exchanges above and below for the other, which is what the second exchange is for.
-    let (mut a_corners, a_turned) = lone_corner_first(a, a_sides);
-    let (mut b_corners, b_turned) = lone_corner_first(b, b_sides);
-    if a_turned {
-        b_corners.swap(1, 2);
-    }
-    if b_turned {
-        a_corners.swap(1, 2);
-    }
-    let ([p_a, q_a, r_a], [p_b, q_b, r_b]) = (a_corners, b_corners);
-    orient3d(p_a, q_a, p_b, q_b) <= 0 && orient3d(p_a, r_a, p_b, r_b) >= 0
+    // exchanges above and below for the other.
+    let (a_order, b_order) = (lone_corner_first(a_sides), lone_corner_first(b_sides));
+    let [p_a, q_a, r_a] = rename(a, a_order, b_order.is_below);
+    let [p_b, q_b, r_b] = rename(b, b_order, a_order.is_below);
+    orient3d(*p_a, *q_a, *p_b, *q_b) <= 0 && orient3d(*p_a, *r_a, *p_b, *r_b) >= 0
 }
 
 fn is_apart(sides: [i8; 3]) -> bool {
     sides[0] != 0 && sides[0] == sides[1] && sides[1] == sides[2]
 }
 
-/// Rotates the corners so that the first has the other two strictly on one side of its own value;
-/// true where they are above it. Not all `sides` are equal.
-fn lone_corner_first(corners: &[Point; 3], sides: [i8; 3]) -> ([Point; 3], bool) {
-    for first in 0..3 {
-        let (second, third) = ((first + 1) % 3, (first + 2) % 3);
-        let highest = sides[second].max(sides[third]);
-        let lowest = sides[second].min(sides[third]);
-        if sides[first] > highest || sides[first] < lowest {
-            let rotated = [corners[first], corners[second], corners[third]];
-            return (rotated, sides[first] < lowest);
+/// Which corner lies by itself.
+#[derive(Clone, Copy)]
+struct Order {
+    lone: u8,
+    /// True where the other two are above it, false where they are below.
+    is_below: bool,
+}
+
+/// The first corner whose side differs from both others in the same direction. Of three signs that
+/// are not all equal there is one.
+///
+/// PERF: a table, since the branches would be as good as random.
+#[inline]
+fn lone_corner_first([i, j, k]: [i8; 3]) -> Order {
+    const ORDERS: [Order; 27] = orders();
+    ORDERS[(9 * i + 3 * j + k + 13) as usize]
+}
+
+const fn orders() -> [Order; 27] {
+    let mut result = [Order { lone: 0, is_below: false }; 27];
+    let mut index = 0;
+    while index < 27 {
+        let sides = [index / 9, index / 3 % 3, index % 3];
+        let mut lone = 3;
+        while lone > 0 {
+            lone -= 1;
+            let (side, next, last) = (sides[lone], sides[(lone + 1) % 3], sides[(lone + 2) % 3]);
+            if (side > next && side > last) || (side < next && side < last) {
+                result[index] = Order { lone: lone as u8, is_below: side < next };
+            }
         }
+        index += 1;
     }
-    unreachable!("three signs that are not all equal have one that differs from both others")
+    result
+}
+
+/// The corners from the lone one on; in reverse where the other triangle is to see this one turned.
+#[inline]
+fn rename(corners: &[Point; 3], order: Order, turned: bool) -> [&Point; 3] {
+    let at = |step: u8| &corners[usize::from((order.lone + step) % 3)];
+    [at(0), at(1 + u8::from(turned)), at(2 - u8::from(turned))]
 }
 
 /// Triangles in one plane, or with a corner order that spans no area.
