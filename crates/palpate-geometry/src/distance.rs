@@ -22,7 +22,11 @@ const MAX_SQUARE: f64 = 1e140;
 /// Parameter in [0, 1] of the point closest to `offset` on the segment from 0 to `edge`.
 #[inline]
 fn closest_parameter(offset: Point, edge: Point, edge_squared: f64) -> f64 {
-    if edge_squared > 0.0 { (vec3::dot(offset, edge) / edge_squared).clamp(0.0, 1.0) } else { 0.0 }
+    if edge_squared >= f64::MIN_POSITIVE {
+        (vec3::dot(offset, edge) / edge_squared).clamp(0.0, 1.0)
+    } else {
+        0.0
+    }
 }
 
 /// The points relative to the first, times a power of two that brings the largest coordinate near

@@ -36,7 +36,8 @@ pub fn edge_edge(a: &[Point; 2], b: &[Point; 2]) -> EdgeEdge {
 /// `u² v² - (u v)²`, which is rounding noise for nearly parallel edges.
 #[inline]
 fn closest(u: Point, v: Point, w: Point, uu: f64, vv: f64) -> EdgeEdge {
-    if uu <= 0.0 {
+    // Subnormal squares, beside a size of one, have no useful inverse: the edge is a point.
+    if uu < f64::MIN_POSITIVE {
         let t = closest_parameter(w, v, vv);
         return with_gap(u, v, w, 0.0, t);
     }
@@ -46,7 +47,7 @@ fn closest(u: Point, v: Point, w: Point, uu: f64, vv: f64) -> EdgeEdge {
     let w_across = vec3::add_scaled(w, u, -w_along);
     let across_squared = vec3::norm_squared(v_across);
     let mut t = 0.0;
-    if across_squared > 0.0 {
+    if across_squared >= f64::MIN_POSITIVE {
         t = (vec3::dot(w_across, v_across) / across_squared).clamp(0.0, 1.0);
     }
     let free = t * v_along - w_along;

@@ -4,7 +4,7 @@ use super::{MAX_SQUARE, MIN_SQUARE, closest_parameter, from_unit_scale, to_unit_
 use crate::{Point, vec3};
 
 /// Below this square of (doubled area / longest edge²) a triangle is a sliver: the signs of its
-/// weights then say too little about which edges may be closest, and all are tried.
+/// weights may say too little about which edges can be closest (or overflow), and all are tried.
 const SLIVER: f64 = 1e-8;
 
 /// The part of a triangle that holds the closest point in its relative interior.
@@ -80,7 +80,8 @@ fn closest(
 /// makes the weights themselves uncertain; the quotients of normals do not have that property.
 #[inline]
 fn foot_on_plane(offsets: [Point; 3], edges: [Point; 3], squares: [f64; 3]) -> ([f64; 3], f64) {
-    if squares[0] <= 0.0 {
+    // Subnormal squares, beside a size of one, have no useful inverse: the edge is a point.
+    if squares[0] < f64::MIN_POSITIVE {
         return ([0.0; 3], 0.0);
     }
     let inverse = 1.0 / squares[0];
@@ -89,7 +90,7 @@ fn foot_on_plane(offsets: [Point; 3], edges: [Point; 3], squares: [f64; 3]) -> (
     let along = vec3::dot(offsets[0], edges[0]) * inverse;
     let across = vec3::add_scaled(offsets[0], edges[0], -along);
     let across_squared = vec3::norm_squared(apex_across);
-    if across_squared <= 0.0 {
+    if across_squared < f64::MIN_POSITIVE {
         return ([0.0; 3], 0.0);
     }
     let c = vec3::dot(across, apex_across) / across_squared;
