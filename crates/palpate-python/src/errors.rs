@@ -1,6 +1,6 @@
 //! The one place where the core's errors become Python exceptions (classes of `palpate.errors`).
 
-use palpate::model::{FileError, MeshError, ModelError};
+use palpate::model::{FileError, FileErrorCause, MeshError, ModelError};
 use palpate::{CheckpointError, SceneError, SimulationError};
 use pyo3::exceptions::{PyOSError, PyValueError};
 use pyo3::prelude::*;
@@ -37,12 +37,6 @@ impl ToPython for MeshError {
     }
 }
 
-impl ToPython for std::io::Error {
-    fn to_python(self, _py: Python<'_>) -> PyErr {
-        self.into()
-    }
-}
-
 /// An OSError of the right subclass, with errno and file name as Python gives them.
 pub(crate) fn io_error(error: &std::io::Error, path: &std::path::Path) -> PyErr {
     match error.raw_os_error() {
@@ -57,7 +51,7 @@ pub(crate) fn io_error(error: &std::io::Error, path: &std::path::Path) -> PyErr 
 
 impl ToPython for FileError {
     fn to_python(self, py: Python<'_>) -> PyErr {
-        if let Some(error) = self.io_error() {
+        if let FileErrorCause::Io(error) = self.cause() {
             return io_error(error, self.path());
         }
         let path = self.path().display().to_string();
@@ -94,6 +88,9 @@ impl ToPython for SimulationError {
 
 impl ToPython for CheckpointError {
     fn to_python(self, py: Python<'_>) -> PyErr {
+        if let Self::Io { path, source } = &self {
+            return io_error(source, path);
+        }
         exception(py, "CheckpointError", (self.to_string(),))
     }
 }

@@ -76,7 +76,7 @@ impl PyMesh {
         }
         let built = py.detach(|| {
             if repair {
-                Mesh::repaired(data).map(|(mesh, report)| (mesh, report.notes()))
+                Mesh::repaired(data).map(|(mesh, report)| (mesh, report.lines()))
             } else {
                 Mesh::new(data).map(|mesh| (mesh, Vec::new()))
             }
@@ -142,7 +142,8 @@ impl PyMesh {
             .into_iter()
             .map(|defect| {
                 let message = defect.to_string();
-                (defect.kind.name().to_owned(), defect.count, defect.first, message)
+                let kind = snake_case(&format!("{:?}", defect.kind));
+                (kind, defect.indices.count, defect.indices.first, message)
             })
             .collect()
     }
@@ -155,6 +156,18 @@ impl PyMesh {
     fn same_as(&self, other: &Self) -> bool {
         self.mesh == other.mesh
     }
+}
+
+/// `UnusedNodes` as Python writes names: `unused_nodes`.
+fn snake_case(name: &str) -> String {
+    let mut result = String::new();
+    for letter in name.chars() {
+        if letter.is_uppercase() && !result.is_empty() {
+            result.push('_');
+        }
+        result.extend(letter.to_lowercase());
+    }
+    result
 }
 
 /// Reads `.seg` or `.vtk`; also what was left out or mended.
