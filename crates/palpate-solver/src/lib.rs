@@ -1,1 +1,15 @@
-//! palpate-solver
+//! Sparse Cholesky for elastic bodies: order, factor, solve.
+//!
+//! Matrices are symmetric positive definite with one 3x3 block per pair of nodes that share an
+//! element. The fill-reducing order is found on the node graph, faer factors supernode by supernode
+//! on the calling thread, and solving allocates nothing.
+
+pub mod block_matrix;
+pub mod cholesky;
+pub mod dense;
+pub mod ordering;
+
+pub use block_matrix::{BlockMatrix, BlockPattern};
+pub use cholesky::{Cholesky, FactorError, FactorStats, SolveWorkspace};
+pub use dense::DenseCholesky;
+pub use ordering::{NodeOrder, OrderingMethod};

@@ -1,0 +1,225 @@
+//! The factor of a body's matrix: made once, solved every step.
+
+mod packed;
+mod scalar_matrix;
+
+use faer::Par;
+use faer::Side;
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::cholesky::llt::factor::LltError;
+use faer::sparse::linalg::cholesky::supernodal::SupernodalLltRef;
+use faer::sparse::linalg::cholesky::{
+    CholeskySymbolicParams, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering,
+    factorize_symbolic_cholesky,
+};
+use faer::sparse::linalg::{SupernodalThreshold, SymbolicSupernodalParams};
+
+use crate::ordering::{NodeOrder, OrderingMethod};
+use crate::{BlockMatrix, BlockPattern};
+use packed::PackedFactor;
+pub use packed::SolveWorkspace;
+use scalar_matrix::ScalarMatrix;
+
+/// Merge supernodes of up to so many columns while so small a part of the merged one is zero.
+const RELAXATION: [(usize, f64); 4] = [(12, 1.0), (32, 0.5), (64, 0.2), (usize::MAX, 0.05)];
+
+/// Largest residual of the probe solve, relative to the right-hand side.
+const PROBE_TOLERANCE: f64 = 1e-6;
+
+/// Why a matrix has no usable factor.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum FactorError {
+    /// A pivot was zero, negative or not a number.
+    #[error(
+        "the matrix is not positive definite at node {node} (column {column}): a part of the body \
+         without mass or stiffness, or an element turned inside out"
+    )]
+    NotPositiveDefinite {
+        /// Node of the pivot, in the caller's numbering.
+        node: usize,
+        /// Row and column of the pivot, in the caller's numbering.
+        column: usize,
+    },
+    /// The factor exists, but solving with it is not accurate.
+    #[error(
+        "the factor is not accurate (relative residual {residual:.1e}): the stiffnesses in the \
+         body differ too much"
+    )]
+    Inaccurate {
+        /// Residual of a solve with a known right-hand side, relative to it.
+        residual: f64,
+    },
+    /// The matrix has another pattern than the one that was analysed.
+    #[error("the matrix has another pattern than the factor; make a new factor")]
+    PatternChanged,
+    /// The factor would not fit into memory or 32-bit indices.
+    #[error("the factor of {nodes} nodes is too large")]
+    TooLarge {
+        /// Nodes of the matrix.
+        nodes: usize,
+    },
+}
+
+/// Size and cost of a factor.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FactorStats {
+    /// Method of the order that was taken.
+    pub ordering: OrderingMethod,
+    /// Entries of the factor, without the zeros that merging supernodes adds.
+    pub entries: u64,
+    /// Multiplications and additions of one factorisation.
+    pub flops: f64,
+    /// Bytes of the factor as it is read by a solve.
+    pub bytes: usize,
+    /// Number of supernodes.
+    pub supernodes: usize,
+}
+
+/// A factored symmetric positive definite block matrix.
+pub struct Cholesky {
+    pattern: std::sync::Arc<BlockPattern>,
+    order: NodeOrder,
+    scalar: ScalarMatrix,
+    symbolic: SymbolicCholesky<u32>,
+    values: Vec<f64>,
+    packed: PackedFactor,
+    scratch: MemBuffer,
+}
+
+impl Cholesky {
+    /// Orders, analyses and factors `matrix`, on the calling thread.
+    ///
+    /// # Errors
+    /// If the matrix is not positive definite or too ill-conditioned for a direct solve.
+    pub fn new(matrix: &BlockMatrix) -> Result<Self, FactorError> {
+        let pattern = std::sync::Arc::clone(matrix.pattern());
+        let order = NodeOrder::new(&pattern);
+        let scalar = ScalarMatrix::new(&pattern, &order.nodes);
+        // With the identity order faer reads the upper pattern here, whatever the side says, and
+        // wants the lower triangle in the numeric phase.
+        let params = CholeskySymbolicParams {
+            supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
+            supernodal_params: SymbolicSupernodalParams { relax: Some(&RELAXATION) },
+            ..CholeskySymbolicParams::default()
+        };
+        let upper = scalar.upper_pattern(&pattern, &order.nodes);
+        let symbolic = factorize_symbolic_cholesky(
+            upper.as_ref(),
+            Side::Upper,
+            SymmetricOrdering::Identity,
+            params,
+        )
+        .map_err(|_| FactorError::TooLarge { nodes: pattern.node_count() })?;
+        let scratch = MemBuffer::new(
+            symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, faer::Spec::default()),
+        );
+        let values = vec![0.0; symbolic.len_val()];
+        let packed = PackedFactor::default();
+        let mut result = Self { pattern, order, scalar, symbolic, values, packed, scratch };
+        result.refactor(matrix)?;
+        Ok(result)
+    }
+
+    /// Factors a matrix with the pattern of the first one. After an error the factor must not be
+    /// used until a later call succeeds.
+    ///
+    /// # Errors
+    /// As [`Cholesky::new`], and if the pattern differs.
+    pub fn refactor(&mut self, matrix: &BlockMatrix) -> Result<(), FactorError> {
+        if **matrix.pattern() != *self.pattern {
+            return Err(FactorError::PatternChanged);
+        }
+        if self.pattern.node_count() == 0 {
+            return Ok(());
+        }
+        self.scalar.set_values(matrix, &self.order.nodes);
+        let factored = self.symbolic.factorize_numeric_llt(
+            &mut self.values,
+            self.scalar.lower(),
+            Side::Lower,
+            faer::linalg::cholesky::llt::factor::LltRegularization::default(),
+            Par::Seq,
+            MemStack::new(&mut self.scratch),
+            faer::Spec::default(),
+        );
+        if let Err(LltError::NonPositivePivot { index }) = factored {
+            return Err(self.not_positive(index));
+        }
+        let SymbolicCholeskyRaw::Supernodal(symbolic) = self.symbolic.raw() else {
+            unreachable!("the supernodal form was forced")
+        };
+        self.packed = PackedFactor::new(SupernodalLltRef::new(symbolic, &self.values));
+        self.probe(matrix)
+    }
+
+    fn not_positive(&self, place: usize) -> FactorError {
+        let place = place.min(3 * self.order.nodes.len() - 1);
+        let node = self.order.nodes[place / 3] as usize;
+        FactorError::NotPositiveDefinite { node, column: 3 * node + place % 3 }
+    }
+
+    /// Solves with a known right-hand side: faer has been seen to return factors of broken input.
+    fn probe(&self, matrix: &BlockMatrix) -> Result<(), FactorError> {
+        let count = self.pattern.node_count();
+        let mut state = 1_u32;
+        let mut draw = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            f64::from(state >> 8) / f64::from(1 << 24) - 0.5
+        };
+        let rhs: Vec<[f64; 3]> = (0..count).map(|_| std::array::from_fn(|_| draw())).collect();
+        let mut solution = rhs.clone();
+        self.solve_in_place(&mut solution, &mut self.workspace());
+        let mut product = vec![[0.0; 3]; count];
+        matrix.multiply(&solution, &mut product);
+        let norm = |v: &[[f64; 3]]| v.as_flattened().iter().map(|x| x * x).sum::<f64>().sqrt();
+        for (p, r) in product.as_flattened_mut().iter_mut().zip(rhs.as_flattened()) {
+            *p -= r;
+        }
+        let residual = norm(&product) / norm(&rhs);
+        if residual < PROBE_TOLERANCE { Ok(()) } else { Err(FactorError::Inaccurate { residual }) }
+    }
+
+    /// Number of nodes.
+    pub fn node_count(&self) -> usize {
+        self.pattern.node_count()
+    }
+
+    /// Memory for solves with this factor, for one thread.
+    pub fn workspace(&self) -> SolveWorkspace {
+        self.packed.workspace()
+    }
+
+    /// Solves `A x = rhs` in place. No allocation.
+    ///
+    /// # Panics
+    /// If `rhs` has not one entry per node, or `workspace` belongs to a factor of another shape.
+    pub fn solve_in_place(&self, rhs: &mut [[f64; 3]], workspace: &mut SolveWorkspace) {
+        self.packed.solve_in_place(&self.order.nodes, rhs, workspace);
+    }
+
+    /// Solves for the three unit forces on `node`: `columns[i][3 * axis + k]` is the displacement
+    /// of node i along k under a unit force along `axis`. No allocation.
+    ///
+    /// # Panics
+    /// If `columns` has not one entry per node.
+    pub fn solve_node(
+        &self,
+        node: usize,
+        columns: &mut [[f64; 9]],
+        workspace: &mut SolveWorkspace,
+    ) {
+        self.packed.solve_node(&self.order.nodes, node, columns, workspace);
+    }
+
+    /// Size and cost.
+    pub fn stats(&self) -> FactorStats {
+        FactorStats {
+            ordering: self.order.method,
+            entries: self.order.factor_entries,
+            flops: self.order.flops,
+            bytes: self.packed.bytes(),
+            supernodes: self.packed.supernode_count(),
+        }
+    }
+}

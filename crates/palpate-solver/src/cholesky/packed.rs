@@ -1,0 +1,263 @@
+//! The factor packed for solving.
+//!
+//! Each supernode stores P = [T^-1; B T^-1] for its diagonal block T and the block B below it, so
+//! that both passes of a solve are one dense product per supernode:
+//!
+//! forward, ascending: `u = P x_top`, `x_top = u_top`, `x[pattern] -= u_below`;
+//! backward, descending: `x_top = P^T [x_top; -x[pattern]]`.
+//!
+//! P lies in panels of [`ROWS`] rows, column after column, without the columns that are zero in the
+//! whole panel. A solve is bound by reading it once per pass.
+
+use faer::linalg::triangular_solve;
+use faer::sparse::linalg::cholesky::supernodal::SupernodalLltRef;
+use faer::{Mat, Par};
+
+/// Rows of a panel: what fits in the vector registers together with three right-hand sides.
+const ROWS: usize = 16;
+/// Running sums per column in the backward pass.
+const LANES: usize = 8;
+
+type Panel = [f64; ROWS];
+
+#[derive(Clone, Copy, Debug)]
+struct Supernode {
+    start: u32,
+    width: u32,
+    pattern_start: u32,
+    pattern_end: u32,
+    panel_start: u32,
+}
+
+impl Supernode {
+    fn columns(self) -> std::ops::Range<usize> {
+        self.start as usize..(self.start + self.width) as usize
+    }
+
+    fn pattern(self) -> std::ops::Range<usize> {
+        self.pattern_start as usize..self.pattern_end as usize
+    }
+
+    fn row_count(self) -> usize {
+        (self.width + self.pattern_end - self.pattern_start) as usize
+    }
+}
+
+/// The packed factor of one matrix.
+#[derive(Debug, Default)]
+pub(super) struct PackedFactor {
+    supernodes: Vec<Supernode>,
+    pattern: Vec<u32>,
+    panels: Vec<Panel>,
+    size: usize,
+    widest: usize,
+    longest: usize,
+}
+
+/// Memory for solves with one factor, for one thread.
+#[derive(Debug, Default)]
+pub struct SolveWorkspace {
+    x: Vec<f64>,
+    top: Vec<f64>,
+    rows: Vec<f64>,
+    sums: Vec<[f64; LANES]>,
+}
+
+impl PackedFactor {
+    pub(super) fn new(factor: SupernodalLltRef<'_, u32, f64>) -> Self {
+        let mut result = Self { size: factor.symbolic().nrows(), ..Self::default() };
+        for index in 0..factor.symbolic().n_supernodes() {
+            let supernode = factor.supernode(index);
+            let values = supernode.val();
+            let (row_count, width) = (values.nrows(), values.ncols());
+            let (top, below) = values.split_at_row(width);
+            let mut packed = Mat::<f64>::zeros(row_count, width);
+            let (mut inverse, mut product) = packed.as_mut().split_at_row_mut(width);
+            inverse.copy_from(Mat::<f64>::identity(width, width));
+            triangular_solve::solve_lower_triangular_in_place(top, inverse, Par::Seq);
+            product.copy_from(below);
+            triangular_solve::solve_upper_triangular_in_place(
+                top.transpose(),
+                product.transpose_mut(),
+                Par::Seq,
+            );
+            let pattern_start = result.pattern.len() as u32;
+            let panel_start = result.panels.len() as u32;
+            result.pattern.extend_from_slice(supernode.pattern());
+            for first in (0..row_count).step_by(ROWS) {
+                for col in 0..width.min(first + ROWS) {
+                    result.panels.push(std::array::from_fn(|lane| {
+                        let row = first + lane;
+                        if row < row_count { packed[(row, col)] } else { 0.0 }
+                    }));
+                }
+            }
+            result.supernodes.push(Supernode {
+                start: supernode.start() as u32,
+                width: width as u32,
+                pattern_start,
+                pattern_end: result.pattern.len() as u32,
+                panel_start,
+            });
+            result.widest = result.widest.max(width);
+            result.longest = result.longest.max(row_count.next_multiple_of(ROWS));
+        }
+        result
+    }
+
+    pub(super) fn bytes(&self) -> usize {
+        size_of_val(&*self.panels) + size_of_val(&*self.pattern) + size_of_val(&*self.supernodes)
+    }
+
+    pub(super) fn supernode_count(&self) -> usize {
+        self.supernodes.len()
+    }
+
+    pub(super) fn workspace(&self) -> SolveWorkspace {
+        SolveWorkspace {
+            x: vec![0.0; 3 * self.size],
+            top: vec![0.0; 3 * self.widest],
+            rows: vec![0.0; 3 * self.longest],
+            sums: vec![[0.0; LANES]; 3 * self.widest],
+        }
+    }
+
+    pub(super) fn solve_in_place(
+        &self,
+        order: &[u32],
+        rhs: &mut [[f64; 3]],
+        work: &mut SolveWorkspace,
+    ) {
+        assert_eq!(rhs.len(), order.len(), "one entry per node");
+        assert_eq!(work.x.len(), 3 * self.size, "workspace of this factor");
+        for (x, &node) in work.x.as_chunks_mut::<3>().0.iter_mut().zip(order) {
+            *x = rhs[node as usize];
+        }
+        pulp::Arch::new().dispatch(
+            #[inline(always)]
+            || {
+                self.forward::<1>(work, 0);
+                self.backward::<1>(work);
+            },
+        );
+        for (x, &node) in work.x.as_chunks::<3>().0.iter().zip(order) {
+            rhs[node as usize] = *x;
+        }
+    }
+
+    pub(super) fn solve_node(
+        &self,
+        order: &[u32],
+        node: usize,
+        columns: &mut [[f64; 9]],
+        work: &mut SolveWorkspace,
+    ) {
+        assert_eq!(columns.len(), order.len(), "one entry per node");
+        assert_eq!(work.x.len(), 3 * self.size, "workspace of this factor");
+        let Some(place) = order.iter().position(|&other| other as usize == node) else {
+            columns.fill([0.0; 9]);
+            return;
+        };
+        work.x.fill(0.0);
+        for axis in 0..3 {
+            work.x[3 * (3 * place + axis) + axis] = 1.0;
+        }
+        pulp::Arch::new().dispatch(
+            #[inline(always)]
+            || {
+                self.forward::<3>(work, 3 * place);
+                self.backward::<3>(work);
+            },
+        );
+        for (x, &node) in work.x.as_chunks::<9>().0.iter().zip(order) {
+            columns[node as usize] = std::array::from_fn(|entry| x[3 * (entry % 3) + entry / 3]);
+        }
+    }
+
+    /// Columns before `first` of the right-hand sides are zero.
+    #[allow(clippy::inline_always)] // compiled for the vector unit that `dispatch` found
+    #[inline(always)]
+    fn forward<const K: usize>(&self, work: &mut SolveWorkspace, first: usize) {
+        let x = work.x.as_chunks_mut::<K>().0;
+        let begin = self.supernodes.partition_point(|node| node.columns().end <= first);
+        for supernode in &self.supernodes[begin..] {
+            let width = supernode.width as usize;
+            let top = &mut work.top.as_chunks_mut::<K>().0[..width];
+            top.copy_from_slice(&x[supernode.columns()]);
+            if K > 1 && top.as_flattened().iter().all(|&value| value == 0.0) {
+                continue;
+            }
+            let rows = work.rows.as_chunks_mut::<K>().0;
+            let mut panels = &self.panels[supernode.panel_start as usize..];
+            for first in (0..supernode.row_count()).step_by(ROWS) {
+                let (panel, rest) = panels.split_at(width.min(first + ROWS));
+                panels = rest;
+                let mut sums = [[0.0; ROWS]; K];
+                for (column, factor) in panel.iter().zip(&*top) {
+                    for k in 0..K {
+                        for lane in 0..ROWS {
+                            sums[k][lane] += column[lane] * factor[k];
+                        }
+                    }
+                }
+                for (lane, row) in rows[first..first + ROWS].iter_mut().enumerate() {
+                    for k in 0..K {
+                        row[k] = sums[k][lane];
+                    }
+                }
+            }
+            let (rows_top, rows_below) = rows.split_at(width);
+            x[supernode.columns()].copy_from_slice(rows_top);
+            for (&row, value) in self.pattern[supernode.pattern()].iter().zip(rows_below) {
+                for k in 0..K {
+                    x[row as usize][k] -= value[k];
+                }
+            }
+        }
+    }
+
+    #[allow(clippy::inline_always)] // as `forward`
+    #[inline(always)]
+    fn backward<const K: usize>(&self, work: &mut SolveWorkspace) {
+        let x = work.x.as_chunks_mut::<K>().0;
+        for supernode in self.supernodes.iter().rev() {
+            let width = supernode.width as usize;
+            let rows = work.rows.as_chunks_mut::<K>().0;
+            rows[..width].copy_from_slice(&x[supernode.columns()]);
+            let pattern = &self.pattern[supernode.pattern()];
+            let row_count = supernode.row_count();
+            for (value, &row) in rows[width..row_count].iter_mut().zip(pattern) {
+                for k in 0..K {
+                    value[k] = -x[row as usize][k];
+                }
+            }
+            rows[row_count..row_count.next_multiple_of(ROWS)].fill([0.0; K]);
+            let sums = &mut work.sums[..K * width];
+            sums.fill([0.0; LANES]);
+            let mut panels = &self.panels[supernode.panel_start as usize..];
+            for first in (0..row_count).step_by(ROWS) {
+                let (panel, rest) = panels.split_at(width.min(first + ROWS));
+                panels = rest;
+                let mut values = [[0.0; ROWS]; K];
+                for (lane, row) in rows[first..first + ROWS].iter().enumerate() {
+                    for k in 0..K {
+                        values[k][lane] = row[k];
+                    }
+                }
+                for (column, sums) in panel.iter().zip(sums.as_chunks_mut::<K>().0) {
+                    for k in 0..K {
+                        for lane in 0..LANES {
+                            sums[k][lane] += column[lane] * values[k][lane]
+                                + column[lane + LANES] * values[k][lane + LANES];
+                        }
+                    }
+                }
+            }
+            for (value, sums) in x[supernode.columns()].iter_mut().zip(sums.as_chunks::<K>().0) {
+                for k in 0..K {
+                    value[k] = sums[k].iter().sum();
+                }
+            }
+        }
+    }
+}

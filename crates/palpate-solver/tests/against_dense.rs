@@ -1,0 +1,191 @@
+//! The sparse solve against a dense factorisation of the same matrix.
+
+#![allow(clippy::needless_range_loop)] // matrices read best by row and column
+use std::sync::Arc;
+
+use palpate_solver::{BlockMatrix, BlockPattern, Cholesky, DenseCholesky, FactorError};
+use proptest::prelude::*;
+
+/// A random symmetric matrix on `cliques`, made positive definite by diagonal dominance.
+fn dominant(
+    node_count: usize,
+    cliques: &[[u32; 4]],
+    values: &mut impl FnMut() -> f64,
+) -> BlockMatrix {
+    let pattern = Arc::new(BlockPattern::from_cliques(node_count, cliques));
+    let mut matrix = BlockMatrix::zeros(Arc::clone(&pattern));
+    for col in 0..node_count as u32 {
+        for &row in pattern.column(col as usize) {
+            let mut block = [[0.0; 3]; 3];
+            for i in 0..3 {
+                for j in 0..=i {
+                    block[i][j] = values();
+                    block[j][i] = if row == col { block[i][j] } else { values() };
+                }
+            }
+            matrix.add(row, col, &block);
+        }
+    }
+    let dense = to_dense(&matrix);
+    let size = 3 * node_count;
+    for node in 0..node_count {
+        let mut block = [[0.0; 3]; 3];
+        for k in 0..3 {
+            let row = 3 * node + k;
+            block[k][k] = 0.1 + (0..size).map(|j| 2.0 * dense[row * size + j].abs()).sum::<f64>();
+        }
+        matrix.add(node as u32, node as u32, &block);
+    }
+    matrix
+}
+
+fn to_dense(matrix: &BlockMatrix) -> Vec<f64> {
+    let count = matrix.pattern().node_count();
+    let size = 3 * count;
+    let mut dense = vec![0.0; size * size];
+    for col in 0..count {
+        for &row in matrix.pattern().column(col) {
+            let index = matrix.pattern().find(row, col as u32).unwrap();
+            let block = matrix.blocks()[index];
+            for i in 0..3 {
+                for j in 0..3 {
+                    let (row, col) = (3 * row as usize + i, 3 * col + j);
+                    dense[row * size + col] = block[i][j];
+                    dense[col * size + row] = block[i][j];
+                }
+            }
+        }
+    }
+    dense
+}
+
+fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+}
+
+fn draws(seed: u64) -> impl FnMut() -> f64 {
+    let mut state = seed.wrapping_mul(2).wrapping_add(1);
+    move || {
+        state =
+            state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+    }
+}
+
+/// Five tetrahedra per cell of a box of nodes.
+fn grid(n: u32) -> (usize, Vec<[u32; 4]>) {
+    let at = |i: u32, j: u32, k: u32| i + n * (j + n * k);
+    let mut cliques = Vec::new();
+    for (i, j, k) in
+        (0..(n - 1).pow(3)).map(|c| (c % (n - 1), c / (n - 1) % (n - 1), c / (n - 1).pow(2)))
+    {
+        let corner = |b: u32| at(i + (b & 1), j + (b >> 1 & 1), k + (b >> 2 & 1));
+        for tet in
+            [[0, 1, 3, 7], [0, 3, 2, 7], [0, 2, 6, 7], [0, 6, 4, 7], [0, 4, 5, 7], [0, 5, 1, 7]]
+        {
+            cliques.push(tet.map(corner));
+        }
+    }
+    ((n * n * n) as usize, cliques)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    #[test]
+    fn solutions_equal_the_dense_ones(
+        node_count in 1_usize..40,
+        cliques in prop::collection::vec(prop::array::uniform4(0_u32..40), 0..60),
+        seed in any::<u64>(),
+    ) {
+        let cliques: Vec<[u32; 4]> =
+            cliques.into_iter().map(|c| c.map(|node| node % node_count as u32)).collect();
+        let mut values = draws(seed);
+        let matrix = dominant(node_count, &cliques, &mut values);
+        let factor = Cholesky::new(&matrix).unwrap();
+        let mut workspace = factor.workspace();
+
+        let rhs: Vec<[f64; 3]> = (0..node_count).map(|_| std::array::from_fn(|_| values())).collect();
+        let mut sparse = rhs.clone();
+        factor.solve_in_place(&mut sparse, &mut workspace);
+        let mut expected = rhs.as_flattened().to_vec();
+        DenseCholesky::default().solve_in_place(&mut to_dense(&matrix), &mut expected).unwrap();
+        prop_assert!(largest_difference(sparse.as_flattened(), &expected) < 1e-12);
+
+        let node = seed as usize % node_count;
+        let mut columns = vec![[0.0; 9]; node_count];
+        factor.solve_node(node, &mut columns, &mut workspace);
+        for axis in 0..3 {
+            let mut unit = vec![[0.0; 3]; node_count];
+            unit[node][axis] = 1.0;
+            factor.solve_in_place(&mut unit, &mut workspace);
+            let column: Vec<f64> = columns.iter().flat_map(|c| c[3 * axis..][..3].to_vec()).collect();
+            prop_assert!(largest_difference(unit.as_flattened(), &column) < 1e-12);
+        }
+    }
+}
+
+#[test]
+fn a_large_grid_is_solved_and_gives_the_same_bits_twice() {
+    let (node_count, cliques) = grid(12);
+    let mut values = draws(3);
+    let matrix = dominant(node_count, &cliques, &mut values);
+    let rhs: Vec<[f64; 3]> = (0..node_count).map(|_| std::array::from_fn(|_| values())).collect();
+    let solve = || {
+        let factor = Cholesky::new(&matrix).unwrap();
+        let mut x = rhs.clone();
+        factor.solve_in_place(&mut x, &mut factor.workspace());
+        (x, factor.stats())
+    };
+    let (x, stats) = solve();
+    let mut product = vec![[0.0; 3]; node_count];
+    matrix.multiply(&x, &mut product);
+    assert!(largest_difference(product.as_flattened(), rhs.as_flattened()) < 1e-12);
+    assert!(stats.entries < 1_500_000, "{stats:?}");
+    let (again, _) = solve();
+    assert!(
+        x.as_flattened().iter().zip(again.as_flattened()).all(|(a, b)| a.to_bits() == b.to_bits())
+    );
+}
+
+#[test]
+fn refactoring_uses_the_new_values() {
+    let (node_count, cliques) = grid(4);
+    let mut matrix = dominant(node_count, &cliques, &mut draws(1));
+    let mut factor = Cholesky::new(&matrix).unwrap();
+    for block in matrix.blocks_mut() {
+        for value in block.as_flattened_mut() {
+            *value *= 2.0;
+        }
+    }
+    factor.refactor(&matrix).unwrap();
+    let mut x = vec![[1.0; 3]; node_count];
+    factor.solve_in_place(&mut x, &mut factor.workspace());
+    let mut product = vec![[0.0; 3]; node_count];
+    matrix.multiply(&x, &mut product);
+    assert!(product.as_flattened().iter().all(|p| (p - 1.0).abs() < 1e-12));
+    let other = BlockMatrix::zeros(Arc::new(BlockPattern::from_cliques(2, &[[0, 1]])));
+    assert_eq!(factor.refactor(&other), Err(FactorError::PatternChanged));
+}
+
+#[test]
+fn a_node_without_stiffness_is_named() {
+    let (node_count, cliques) = grid(3);
+    let mut matrix = dominant(node_count, &cliques, &mut draws(1));
+    let index = matrix.pattern().find(13, 13).unwrap();
+    matrix.blocks_mut()[index][1][1] = -1.0;
+    match Cholesky::new(&matrix) {
+        Err(FactorError::NotPositiveDefinite { node, .. }) => assert_eq!(node, 13),
+        Err(other) => panic!("{other}"),
+        Ok(_) => panic!("the matrix is indefinite"),
+    }
+    matrix.blocks_mut()[index][1][1] = f64::NAN;
+    assert!(Cholesky::new(&matrix).is_err());
+}
+
+#[test]
+fn an_empty_matrix_is_fine() {
+    let matrix = BlockMatrix::zeros(Arc::new(BlockPattern::from_cliques::<4>(0, &[])));
+    let factor = Cholesky::new(&matrix).unwrap();
+    factor.solve_in_place(&mut [], &mut factor.workspace());
+}
