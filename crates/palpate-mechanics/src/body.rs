@@ -1,0 +1,180 @@
+//! One body: its rest state, its matrices and how it moves when nothing touches it.
+
+mod elastic;
+mod element;
+mod frame;
+mod inertia;
+
+use glam::DVec3;
+use palpate_geometry::Point;
+use palpate_model::{Body, RigidMotion};
+
+use crate::contact::compliance::ComplianceCache;
+use crate::error::MechanicsError;
+pub(crate) use elastic::ElasticBody;
+
+/// A body in motion. All arrays have one entry per node.
+pub(crate) struct MovingBody {
+    pub(crate) index: usize,
+    pub(crate) kind: BodyKind,
+    pub(crate) positions: Vec<Point>,
+    pub(crate) velocities: Vec<Point>,
+    pub(crate) forces: Vec<Point>,
+    /// Contact forces [N] of the last finished step.
+    pub(crate) contact_forces: Vec<Point>,
+    /// Positions [m] at the end of this step if nothing touches.
+    pub(crate) free_positions: Vec<Point>,
+    pub(crate) next_positions: Vec<Point>,
+    pub(crate) next_velocities: Vec<Point>,
+    pub(crate) motion: Motion,
+    pub(crate) compliance: ComplianceCache,
+    /// Columns solved in this step.
+    pub(crate) new_columns: usize,
+    /// Whether contact forces act in this step.
+    pub(crate) touched: bool,
+}
+
+/// How far the surface moves in the step that has begun.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Motion {
+    /// Mean displacement [m].
+    pub(crate) mean: DVec3,
+    /// Largest deviation of a displacement from the mean [m].
+    pub(crate) spread: f64,
+    /// Largest displacement relative to the rigid part of the motion [m].
+    pub(crate) deformation: f64,
+}
+
+pub(crate) enum BodyKind {
+    Elastic(Box<ElasticBody>),
+    Rigid { rest: Vec<Point>, motion: RigidMotion },
+}
+
+impl MovingBody {
+    pub(crate) fn new(
+        index: usize,
+        body: &Body,
+        gravity: Point,
+        time_step: f64,
+    ) -> Result<Self, MechanicsError> {
+        let nodes = body.mesh.nodes();
+        let (kind, compliance) = if let Some(motion) = &body.rigid {
+            let kind = BodyKind::Rigid { rest: nodes.to_vec(), motion: motion.clone() };
+            (kind, ComplianceCache::default())
+        } else {
+            let elastic = ElasticBody::new(index, body, gravity, time_step)?;
+            let compliance = ComplianceCache::new(&body.mesh);
+            (BodyKind::Elastic(Box::new(elastic)), compliance)
+        };
+        let zero = vec![[0.0; 3]; nodes.len()];
+        let mut result = Self {
+            index,
+            positions: nodes.to_vec(),
+            velocities: zero.clone(),
+            forces: zero.clone(),
+            contact_forces: zero.clone(),
+            free_positions: nodes.to_vec(),
+            next_positions: nodes.to_vec(),
+            next_velocities: zero,
+            motion: Motion::default(),
+            compliance,
+            new_columns: 0,
+            touched: false,
+            kind,
+        };
+        match &result.kind {
+            BodyKind::Elastic(elastic) => {
+                for (node, velocity) in result.velocities.iter_mut().enumerate() {
+                    *velocity =
+                        if elastic.is_free(node) { body.initial_velocity } else { [0.0; 3] };
+                }
+            }
+            BodyKind::Rigid { rest, motion } => {
+                let pose = motion.pose(0.0);
+                result.positions = rest.iter().map(|&node| pose.apply(node)).collect();
+            }
+        }
+        Ok(result)
+    }
+
+    pub(crate) fn elastic(&self) -> Option<&ElasticBody> {
+        match &self.kind {
+            BodyKind::Elastic(elastic) => Some(elastic),
+            BodyKind::Rigid { .. } => None,
+        }
+    }
+
+    /// Moves the body as if alone; `surface` are its surface nodes, `end` the time after the step.
+    pub(crate) fn predict(&mut self, surface: &[u32], end: f64) {
+        let deformation = match &mut self.kind {
+            BodyKind::Elastic(elastic) => {
+                elastic.predict(&self.positions, &self.velocities, &self.forces);
+                elastic.free_positions(&mut self.free_positions);
+                elastic.largest_deformation(surface)
+            }
+            BodyKind::Rigid { rest, motion } => {
+                let pose = motion.pose(end);
+                for (node, &rest) in self.free_positions.iter_mut().zip(&*rest) {
+                    *node = pose.apply(rest);
+                }
+                0.0
+            }
+        };
+        let displacement = |&node: &u32| {
+            DVec3::from_array(self.free_positions[node as usize])
+                - DVec3::from_array(self.positions[node as usize])
+        };
+        let mean = surface.iter().map(displacement).sum::<DVec3>() / surface.len().max(1) as f64;
+        let spread = surface.iter().map(|node| (displacement(node) - mean).length());
+        self.motion = Motion { mean, spread: spread.fold(0.0, f64::max), deformation };
+    }
+
+    /// Makes the compliance columns of `nodes` available.
+    pub(crate) fn prepare_compliance(&mut self, nodes: &[u32], step: u64) {
+        self.new_columns = match &mut self.kind {
+            BodyKind::Elastic(elastic) => self.compliance.prepare(elastic, nodes, step),
+            BodyKind::Rigid { .. } => 0,
+        };
+    }
+
+    /// Computes the state after the step under `contact_forces`.
+    pub(crate) fn advance(&mut self, time_step: f64) {
+        match &mut self.kind {
+            BodyKind::Elastic(elastic) => {
+                if self.touched {
+                    elastic.respond(&self.contact_forces);
+                }
+                elastic.advance(
+                    &self.positions,
+                    &self.forces,
+                    &self.contact_forces,
+                    &mut self.next_positions,
+                    &mut self.next_velocities,
+                );
+            }
+            BodyKind::Rigid { .. } => {
+                self.next_positions.copy_from_slice(&self.free_positions);
+                for ((velocity, new), old) in
+                    self.next_velocities.iter_mut().zip(&self.free_positions).zip(&self.positions)
+                {
+                    *velocity = std::array::from_fn(|k| (new[k] - old[k]) / time_step);
+                }
+            }
+        }
+    }
+
+    /// The first node whose next state is not finite.
+    pub(crate) fn first_broken_node(&self) -> Option<usize> {
+        first_not_finite(&self.next_positions).or_else(|| first_not_finite(&self.next_velocities))
+    }
+
+    pub(crate) fn commit(&mut self) {
+        std::mem::swap(&mut self.positions, &mut self.next_positions);
+        std::mem::swap(&mut self.velocities, &mut self.next_velocities);
+    }
+}
+
+/// Index of the first vector with an infinite or undefined component.
+pub(crate) fn first_not_finite(vectors: &[Point]) -> Option<usize> {
+    vectors.iter().position(|vector| !vector.iter().all(|x| x.is_finite()))
+}

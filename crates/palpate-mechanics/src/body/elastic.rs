@@ -1,0 +1,508 @@
+//! A deformable body: linear elasticity in its own rotating frame, one implicit Euler step at a time.
+//!
+//! In the frame R, with u = R^T (x - c) - X, the elastic energy is u^T K u / 2. The step solves
+//!
+//! `A d = f(x*) `, `A = (1/dt² + alpha/dt) M + (1 + beta/dt) K`, `x = x* + R d`, `v = v* + R d / dt`
+//!
+//! for the correction d of an inertial prediction (x*, v*). A is constant, so its factor is made once.
+
+use std::sync::Arc;
+
+use glam::{DMat3, DQuat, DVec3};
+use palpate_geometry::Point;
+use palpate_model::Body;
+use palpate_solver::{
+    BlockMatrix, BlockPattern, Cholesky, FactorError, FactorStats, SolveWorkspace,
+};
+
+use super::element::{lame_parameters, shape_gradients, stiffness_block};
+use super::frame::best_rotation;
+use super::inertia::Inertia;
+use crate::error::MechanicsError;
+
+const FIXED: u32 = u32::MAX;
+
+pub(crate) struct ElasticBody {
+    /// Rest positions relative to their centre of mass [m].
+    rest: Vec<DVec3>,
+    masses: Vec<f64>,
+    stiffness: BlockMatrix,
+    factor: Cholesky,
+    /// Nodes that are not fixed, and where each node is among them.
+    free_nodes: Vec<u32>,
+    free_index: Vec<u32>,
+    damping: f64,
+    mass_damping: f64,
+    gravity: DVec3,
+    time_step: f64,
+    step: Step,
+}
+
+/// What a step computes; kept between its two halves.
+struct Step {
+    start: Inertia,
+    frame: DMat3,
+    /// Predicted positions and velocities.
+    positions: Vec<DVec3>,
+    velocities: Vec<DVec3>,
+    /// Velocity of the deformation in the frame, without the body's rotation.
+    deformation: Vec<DVec3>,
+    strain: Vec<[f64; 3]>,
+    force: Vec<[f64; 3]>,
+    /// Correction of the free nodes in the frame [m].
+    correction: Vec<[f64; 3]>,
+    rhs: Vec<[f64; 3]>,
+    columns: Vec<[f64; 9]>,
+    workspace: SolveWorkspace,
+}
+
+impl ElasticBody {
+    pub(super) fn new(
+        index: usize,
+        body: &Body,
+        gravity: Point,
+        time_step: f64,
+    ) -> Result<Self, MechanicsError> {
+        check_material(index, body)?;
+        let mesh = &body.mesh;
+        let (nodes, tetrahedra) = (mesh.nodes(), mesh.tetrahedra());
+        let name = || body.name.clone();
+        if tetrahedra.is_empty() {
+            return Err(MechanicsError::NoTetrahedra { body: index, name: name() });
+        }
+        let count = nodes.len();
+        let material = &body.material;
+        let lame = lame_parameters(material);
+        let mut masses = vec![0.0; count];
+        let pattern = Arc::new(BlockPattern::from_cliques(count, tetrahedra));
+        let mut stiffness = BlockMatrix::zeros(Arc::clone(&pattern));
+        for corners in tetrahedra {
+            let (volume, gradients) =
+                shape_gradients(corners.map(|node| DVec3::from_array(nodes[node as usize])));
+            for (&row, gi) in corners.iter().zip(gradients) {
+                masses[row as usize] += 0.25 * material.density * volume;
+                for (&col, gj) in corners.iter().zip(gradients) {
+                    if col <= row {
+                        stiffness.add(row, col, &stiffness_block(volume, lame, gi, gj));
+                    }
+                }
+            }
+        }
+        if let Some(node) = masses.iter().position(|&mass| mass <= 0.0) {
+            return Err(MechanicsError::LooseNode { body: index, name: name(), node });
+        }
+        let mut free_index = vec![0; count];
+        for &node in &body.fixed_nodes {
+            free_index[node as usize] = FIXED;
+        }
+        let free_nodes: Vec<u32> =
+            (0..count as u32).filter(|&node| free_index[node as usize] != FIXED).collect();
+        for (place, &node) in free_nodes.iter().enumerate() {
+            free_index[node as usize] = place as u32;
+        }
+        let system = system_matrix(&stiffness, &masses, &free_index, body, time_step);
+        let factor = Cholesky::new(&system).map_err(|source| {
+            let source = in_body_numbering(source, &free_nodes);
+            MechanicsError::Factor { body: index, name: name(), source }
+        })?;
+        let start = Inertia::new(&masses, nodes, &vec![[0.0; 3]; count]);
+        let rest = nodes.iter().map(|&node| DVec3::from_array(node) - start.center).collect();
+        let step = Step {
+            start,
+            frame: DMat3::IDENTITY,
+            positions: vec![DVec3::ZERO; count],
+            velocities: vec![DVec3::ZERO; count],
+            deformation: vec![DVec3::ZERO; count],
+            strain: vec![[0.0; 3]; count],
+            force: vec![[0.0; 3]; count],
+            correction: vec![[0.0; 3]; free_nodes.len()],
+            rhs: vec![[0.0; 3]; free_nodes.len()],
+            columns: vec![[0.0; 9]; free_nodes.len()],
+            workspace: factor.workspace(),
+        };
+        Ok(Self {
+            rest,
+            masses,
+            stiffness,
+            factor,
+            free_nodes,
+            free_index,
+            damping: material.damping,
+            mass_damping: material.mass_damping,
+            gravity: DVec3::from_array(gravity),
+            time_step,
+            step,
+        })
+    }
+
+    pub(crate) fn is_free(&self, node: usize) -> bool {
+        self.free_index[node] != FIXED
+    }
+
+    fn is_unattached(&self) -> bool {
+        self.free_nodes.len() == self.masses.len()
+    }
+
+    pub(crate) fn masses(&self) -> &[f64] {
+        &self.masses
+    }
+
+    pub(crate) fn gravity(&self) -> DVec3 {
+        self.gravity
+    }
+
+    /// The frame of the step that has begun.
+    pub(crate) fn frame(&self) -> DMat3 {
+        self.step.frame
+    }
+
+    pub(crate) fn factor_stats(&self) -> FactorStats {
+        self.factor.stats()
+    }
+
+    /// Prediction, then the correction by every force but contact.
+    pub(super) fn predict(&mut self, x: &[Point], v: &[Point], forces: &[Point]) {
+        let dt = self.time_step;
+        self.step.start = Inertia::new(&self.masses, x, v);
+        if self.is_unattached() {
+            self.predict_rigidly(x, v);
+        } else {
+            for (node, predicted) in self.step.positions.iter_mut().enumerate() {
+                let (x, v) = (DVec3::from_array(x[node]), DVec3::from_array(v[node]));
+                let free = self.free_index[node] != FIXED;
+                *predicted = if free { x + dt * v } else { x };
+                self.step.velocities[node] = if free { v } else { DVec3::ZERO };
+            }
+        }
+        let frame = self.fit_frame();
+        self.step.frame = frame;
+        self.internal_forces();
+        let to_frame = frame.transpose();
+        for (place, &node) in self.free_nodes.iter().enumerate() {
+            let node = node as usize;
+            let mass = self.masses[node];
+            let external = DVec3::from_array(forces[node])
+                + mass * (self.gravity - self.mass_damping * self.step.velocities[node]);
+            let force = DVec3::from_array(self.step.force[node]) + to_frame * external;
+            self.step.correction[place] = force.to_array();
+        }
+        self.factor.solve_in_place(&mut self.step.correction, &mut self.step.workspace);
+    }
+
+    /// Rotates the body exactly about its centre and carries the rest of the velocity along, so that a
+    /// fast tumble neither inflates the body nor changes its momenta.
+    fn predict_rigidly(&mut self, x: &[Point], v: &[Point]) {
+        let dt = self.time_step;
+        let Inertia { center, velocity, spin, tensor } = self.step.start;
+        let inverse = tensor.inverse();
+        let omega = inverse * spin;
+        // Angular velocity at the middle of the step, for the conserved angular momentum.
+        let mut middle = omega;
+        for _ in 0..4 {
+            let half = DMat3::from_quat(DQuat::from_scaled_axis(0.5 * dt * middle));
+            middle = half * (inverse * (half.transpose() * spin));
+        }
+        let turn = DMat3::from_quat(DQuat::from_scaled_axis(dt * middle));
+        let turned_omega = turn * (inverse * (turn.transpose() * spin));
+        for node in 0..x.len() {
+            let r = DVec3::from_array(x[node]) - center;
+            let rest = turn * (DVec3::from_array(v[node]) - velocity - omega.cross(r));
+            let turned = turn * r;
+            self.step.positions[node] = center + dt * velocity + turned + dt * rest;
+            self.step.velocities[node] = velocity + turned_omega.cross(turned) + rest;
+        }
+    }
+
+    /// Frame of the predicted positions.
+    fn fit_frame(&mut self) -> DMat3 {
+        let center = self.predicted_center();
+        let mut fit = DMat3::ZERO;
+        for ((&m, &x), &rest) in self.masses.iter().zip(&self.step.positions).zip(&self.rest) {
+            let r = m * (x - center);
+            fit += DMat3::from_cols(rest.x * r, rest.y * r, rest.z * r);
+        }
+        best_rotation(fit)
+    }
+
+    fn predicted_center(&self) -> DVec3 {
+        let mut center = DVec3::ZERO;
+        let mut total = 0.0;
+        for (&m, &x) in self.masses.iter().zip(&self.step.positions) {
+            center += m * x;
+            total += m;
+        }
+        center / total
+    }
+
+    /// Elastic and damping forces in the frame at the predicted state.
+    ///
+    /// The frame turns with the body, dR = [theta] R with theta = H^-1 sum m (R X) x dx. The gradient
+    /// of the energy through it adds `m (H^-1 tau) x X` to the forces -K u, tau being their torque:
+    /// exactly what makes the torque of all internal forces vanish.
+    fn internal_forces(&mut self) {
+        let to_frame = self.step.frame.transpose();
+        let center = self.predicted_center();
+        let (mut velocity, mut total) = (DVec3::ZERO, 0.0);
+        for (&m, &v) in self.masses.iter().zip(&self.step.velocities) {
+            velocity += m * v;
+            total += m;
+        }
+        velocity /= total;
+        // Rotation of the predicted body, to be left out of the damping.
+        let (mut spin, mut second) = (DVec3::ZERO, DMat3::ZERO);
+        let mut fit = DMat3::ZERO;
+        for node in 0..self.masses.len() {
+            let m = self.masses[node];
+            let r = to_frame * (self.step.positions[node] - center);
+            let v = to_frame * (self.step.velocities[node] - velocity);
+            spin += m * r.cross(v);
+            second += DMat3::from_cols(m * r.x * r, m * r.y * r, m * r.z * r);
+            let rest = self.rest[node];
+            fit += DMat3::from_cols(m * rest.x * r, m * rest.y * r, m * rest.z * r);
+        }
+        let omega = complement(second).inverse() * spin;
+        for node in 0..self.masses.len() {
+            let r = to_frame * (self.step.positions[node] - center);
+            let v = to_frame * (self.step.velocities[node] - velocity) - omega.cross(r);
+            self.step.deformation[node] = v;
+            self.step.strain[node] = (r - self.rest[node] + self.damping * v).to_array();
+        }
+        self.stiffness.multiply(&self.step.strain, &mut self.step.force);
+        let mut torque = DVec3::ZERO;
+        for (&x, &force) in self.step.positions.iter().zip(&self.step.force) {
+            torque += (to_frame * (x - center)).cross(DVec3::from_array(force));
+        }
+        let turning = complement(fit).inverse() * torque;
+        let turning = if turning.is_finite() { turning } else { DVec3::ZERO };
+        for (node, force) in self.step.force.iter_mut().enumerate() {
+            let exact =
+                self.masses[node] * turning.cross(self.rest[node]) - DVec3::from_array(*force);
+            *force = exact.to_array();
+        }
+    }
+
+    /// Positions at the end of the step if nothing touches.
+    pub(super) fn free_positions(&self, positions: &mut [Point]) {
+        for (position, predicted) in positions.iter_mut().zip(&self.step.positions) {
+            *position = predicted.to_array();
+        }
+        for (&node, &d) in self.free_nodes.iter().zip(&self.step.correction) {
+            let moved = self.step.positions[node as usize] + self.step.frame * DVec3::from_array(d);
+            positions[node as usize] = moved.to_array();
+        }
+    }
+
+    /// Largest displacement in this step that is not rigid, over `surface` nodes [m].
+    pub(super) fn largest_deformation(&self, surface: &[u32]) -> f64 {
+        let count = self.free_nodes.len().max(1) as f64;
+        let mean: DVec3 =
+            self.step.correction.iter().map(|&d| DVec3::from_array(d)).sum::<DVec3>() / count;
+        let moved = surface.iter().map(|&node| {
+            let place = self.free_index[node as usize];
+            let d = if place == FIXED {
+                DVec3::ZERO
+            } else {
+                DVec3::from_array(self.step.correction[place as usize])
+            };
+            (self.time_step * self.step.deformation[node as usize] + d - mean).length()
+        });
+        moved.fold(0.0, f64::max)
+    }
+
+    /// Solves for the three unit forces on `node`, which must be free; read the result with
+    /// [`ElasticBody::compliance`].
+    pub(crate) fn solve_compliance(&mut self, node: u32) {
+        let place = self.free_index[node as usize] as usize;
+        self.factor.solve_node(place, &mut self.step.columns, &mut self.step.workspace);
+    }
+
+    /// Displacement in the frame of every free node under the three unit forces: entry
+    /// `3 * axis + k` is along k under the force along axis [m/N].
+    pub(crate) fn compliance(&self) -> &[[f64; 9]] {
+        &self.step.columns
+    }
+
+    /// Where a node is among the free ones; `None` when it is fixed.
+    pub(crate) fn free_place(&self, node: u32) -> Option<usize> {
+        let place = self.free_index[node as usize];
+        (place != FIXED).then_some(place as usize)
+    }
+
+    /// Adds the response to contact forces [N] to the correction.
+    pub(super) fn respond(&mut self, forces: &[Point]) {
+        let to_frame = self.step.frame.transpose();
+        for (rhs, &node) in self.step.rhs.iter_mut().zip(&self.free_nodes) {
+            *rhs = (to_frame * DVec3::from_array(forces[node as usize])).to_array();
+        }
+        self.factor.solve_in_place(&mut self.step.rhs, &mut self.step.workspace);
+        for (d, more) in self.step.correction.iter_mut().zip(&self.step.rhs) {
+            for k in 0..3 {
+                d[k] += more[k];
+            }
+        }
+    }
+
+    /// The state after the step.
+    pub(super) fn advance(
+        &self,
+        x: &[Point],
+        forces: &[Point],
+        contact_forces: &[Point],
+        next_x: &mut [Point],
+        next_v: &mut [Point],
+    ) {
+        next_x.copy_from_slice(x);
+        next_v.fill([0.0; 3]);
+        for (&node, &d) in self.free_nodes.iter().zip(&self.step.correction) {
+            let node = node as usize;
+            let d = self.step.frame * DVec3::from_array(d);
+            next_x[node] = (self.step.positions[node] + d).to_array();
+            next_v[node] = (self.step.velocities[node] + d / self.time_step).to_array();
+        }
+        if self.is_unattached() {
+            let target = self.next_spin(x, forces, contact_forces);
+            self.correct_spin(target, next_x, next_v);
+        }
+    }
+
+    /// Angular momentum about the centre after the step: only external torques change it.
+    fn next_spin(&self, x: &[Point], forces: &[Point], contact: &[Point]) -> DVec3 {
+        let start = &self.step.start;
+        let mut torque = DVec3::ZERO;
+        for ((&x, &f), &contact) in x.iter().zip(forces).zip(contact) {
+            let force = DVec3::from_array(f) + DVec3::from_array(contact);
+            torque += (DVec3::from_array(x) - start.center).cross(force);
+        }
+        (start.spin + self.time_step * torque) / (1.0 + self.mass_damping * self.time_step)
+    }
+
+    /// The linear step conserves angular momentum to first order in dt; the rest is put right by a
+    /// rigid rotation: of positions and velocities first, then of the velocities alone, to round-off.
+    fn correct_spin(&self, target: DVec3, x: &mut [Point], v: &mut [Point]) {
+        for rotate in [true, false] {
+            let now = Inertia::new(&self.masses, x, v);
+            let omega = now.tensor.inverse() * (target - now.spin);
+            if !omega.is_finite() {
+                return;
+            }
+            let turn = if rotate {
+                DMat3::from_quat(DQuat::from_scaled_axis(self.time_step * omega))
+            } else {
+                DMat3::IDENTITY
+            };
+            for (x, v) in x.iter_mut().zip(v.iter_mut()) {
+                let r = DVec3::from_array(*x) - now.center;
+                *v = (DVec3::from_array(*v) + omega.cross(r)).to_array();
+                if rotate {
+                    *x = (now.center + turn * r).to_array();
+                }
+            }
+        }
+    }
+
+    /// Elastic energy [J] at positions `x`.
+    pub(crate) fn elastic_energy(&self, x: &[Point]) -> f64 {
+        let total: f64 = self.masses.iter().sum();
+        let weighted = self.masses.iter().zip(x).map(|(&m, &x)| m * DVec3::from_array(x));
+        let center = weighted.sum::<DVec3>() / total;
+        let mut fit = DMat3::ZERO;
+        for ((&m, &x), rest) in self.masses.iter().zip(x).zip(&self.rest) {
+            let r = m * (DVec3::from_array(x) - center);
+            fit += DMat3::from_cols(rest.x * r, rest.y * r, rest.z * r);
+        }
+        let to_frame = best_rotation(fit).transpose();
+        let strain: Vec<[f64; 3]> = x
+            .iter()
+            .zip(&self.rest)
+            .map(|(&x, &rest)| (to_frame * (DVec3::from_array(x) - center) - rest).to_array())
+            .collect();
+        let mut product = vec![[0.0; 3]; strain.len()];
+        self.stiffness.multiply(&strain, &mut product);
+        let pairs = strain.as_flattened().iter().zip(product.as_flattened());
+        0.5 * pairs.map(|(u, f)| u * f).sum::<f64>()
+    }
+}
+
+/// tr(S) I - S for the symmetric part S of `m`.
+fn complement(m: DMat3) -> DMat3 {
+    let symmetric = (m + m.transpose()) * 0.5;
+    let trace = m.x_axis.x + m.y_axis.y + m.z_axis.z;
+    DMat3::from_diagonal(DVec3::splat(trace)) - symmetric
+}
+
+/// A over the free nodes.
+fn system_matrix(
+    stiffness: &BlockMatrix,
+    masses: &[f64],
+    free_index: &[u32],
+    body: &Body,
+    time_step: f64,
+) -> BlockMatrix {
+    let factor = 1.0 + body.material.damping / time_step;
+    let mut edges: Vec<[u32; 2]> = Vec::new();
+    let pattern = stiffness.pattern();
+    let mut kept = Vec::new();
+    for col in 0..masses.len() as u32 {
+        let first = free_index[col as usize];
+        for &row in pattern.column(col as usize) {
+            let second = free_index[row as usize];
+            if first != FIXED && second != FIXED {
+                edges.push([first, second]);
+                kept.push((row, col));
+            }
+        }
+    }
+    let free_count = free_index.iter().filter(|&&place| place != FIXED).count();
+    let mut system = BlockMatrix::zeros(Arc::new(BlockPattern::from_cliques(free_count, &edges)));
+    let inertia = 1.0 / (time_step * time_step) + body.material.mass_damping / time_step;
+    for ([col, row], (full_row, full_col)) in edges.into_iter().zip(kept) {
+        let index = pattern.find(full_row, full_col).expect("taken from the pattern");
+        let mut block = stiffness.blocks()[index].map(|line| line.map(|value| factor * value));
+        if row == col {
+            for (k, line) in block.iter_mut().enumerate() {
+                line[k] += inertia * masses[full_row as usize];
+            }
+        }
+        system.add(row, col, &block);
+    }
+    system
+}
+
+fn in_body_numbering(error: FactorError, free_nodes: &[u32]) -> FactorError {
+    match error {
+        FactorError::NotPositiveDefinite { node, column } => {
+            let node = free_nodes[node] as usize;
+            FactorError::NotPositiveDefinite { node, column: 3 * node + column % 3 }
+        }
+        other => other,
+    }
+}
+
+fn check_material(index: usize, body: &Body) -> Result<(), MechanicsError> {
+    let m = &body.material;
+    let finite = |value: f64, ok: bool| value.is_finite() && ok;
+    let checks = [
+        ("young", m.young, finite(m.young, m.young > 0.0), "a positive number of Pa"),
+        ("poisson", m.poisson, m.poisson > -1.0 && m.poisson < 0.5, "-1 < poisson < 0.5"),
+        ("density", m.density, finite(m.density, m.density > 0.0), "a positive number of kg/m³"),
+        ("damping", m.damping, finite(m.damping, m.damping >= 0.0), "a number of s, not negative"),
+        (
+            "mass damping",
+            m.mass_damping,
+            finite(m.mass_damping, m.mass_damping >= 0.0),
+            "a number of 1/s, not negative",
+        ),
+    ];
+    for (what, value, ok, expected) in checks {
+        if !ok {
+            let name = body.name.clone();
+            return Err(MechanicsError::BadParameter { body: index, name, what, value, expected });
+        }
+    }
+    let velocity = body.initial_velocity.iter().copied().find(|value| !value.is_finite());
+    if let Some(value) = velocity {
+        let (name, what, expected) = (body.name.clone(), "initial velocity", "finite numbers");
+        return Err(MechanicsError::BadParameter { body: index, name, what, value, expected });
+    }
+    Ok(())
+}

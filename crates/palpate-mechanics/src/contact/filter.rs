@@ -1,0 +1,258 @@
+//! From close pairs to contacts: which pairs carry a force, and with what law.
+//!
+//! Proximity is complete: a node near an edge is close to both triangles there and to some beyond.
+//! Kept are the local minima of the distance between the surfaces, each once.
+
+use glam::DVec3;
+use palpate_contact::{PairKind, PenetratingNode, ProximityPair};
+use palpate_geometry::Point;
+
+use super::{ContactParameters, Surface, side};
+
+/// Slack in the tests of direction: a flat surface must not lose its contacts to round-off.
+const ANGLE_SLACK: f64 = 1e-6;
+/// A node whose own surface faces away from the other body by more than this does not touch it.
+const FACING_LIMIT: f64 = 0.2;
+/// Edge pairs count only where both edges are sharper than this (sine of the angle between the
+/// faces): on smooth surfaces nodes against triangles do, up to a small part of the contact distance.
+const SHARP_EDGE: f64 = 0.25;
+/// Elements of one body closer than this at rest, in contact distances, do not push each other.
+const REST_NEIGHBOUR: f64 = 2.0;
+/// A node behind its own body's surface has passed through it when the two were this many times
+/// farther apart at rest; otherwise there is only a thin wall between them.
+const PASSED_THROUGH: f64 = 4.0;
+/// Time in which the contact distance is recovered where surfaces overlap [s].
+const RECOVERY_TIME: f64 = 0.05;
+
+/// A possible contact of this step.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Candidate {
+    pub(crate) kind: PairKind,
+    pub(crate) bodies: [u32; 2],
+    pub(crate) nodes: [u32; 4],
+    pub(crate) weights: [f64; 4],
+    pub(crate) normal: DVec3,
+    /// Gap at the start of the step [m], negative inside.
+    pub(crate) gap: f64,
+    /// Gap below which the surfaces push [m].
+    pub(crate) distance: f64,
+    /// Force per overlap [N/m].
+    pub(crate) stiffness: f64,
+    /// Largest gap at the end of the step that the contact may push to [m].
+    pub(crate) recovery: f64,
+    pub(crate) friction: f64,
+}
+
+/// What the filter sees of one body.
+#[derive(Clone, Copy)]
+pub(crate) struct BodyView<'a> {
+    pub(crate) surface: &'a Surface,
+    pub(crate) parameters: &'a ContactParameters,
+    /// Positions at the start of the step.
+    pub(crate) positions: &'a [Point],
+}
+
+impl BodyView<'_> {
+    fn at(&self, node: u32) -> DVec3 {
+        DVec3::from_array(self.positions[node as usize])
+    }
+
+    fn rest(&self, node: u32) -> DVec3 {
+        DVec3::from_array(self.surface.mesh().nodes()[node as usize])
+    }
+}
+
+/// Finds the contact candidates of a step. Keeps its memory.
+#[derive(Debug, Default)]
+pub(crate) struct Filter {
+    /// (body, node, other body) of the nodes that are inside another body, sorted.
+    inside: Vec<(u32, u32, u32)>,
+}
+
+impl Filter {
+    /// Writes the candidates of this step, in the order of the pairs, then of the penetrations.
+    pub(crate) fn run<'a>(
+        &mut self,
+        proximity: &[ProximityPair],
+        penetration: &[PenetratingNode],
+        view: impl Fn(u32) -> BodyView<'a>,
+        time_step: f64,
+        candidates: &mut Vec<Candidate>,
+    ) {
+        self.inside.clear();
+        self.inside.extend(penetration.iter().map(|p| (p.body, p.node, p.into_body)));
+        self.inside.sort_unstable();
+        candidates.clear();
+        for pair in proximity {
+            let bodies = pair.bodies.map(&view);
+            if bodies[0].parameters.rigid && bodies[1].parameters.rigid {
+                continue;
+            }
+            let gap = match pair.kind {
+                PairKind::VertexTriangle => self.vertex_triangle(pair, bodies),
+                PairKind::EdgeEdge => edge_edge(pair, bodies),
+            };
+            if let Some((gap, normal)) = gap {
+                let area = match pair.kind {
+                    PairKind::VertexTriangle => bodies[0].surface.node_area(pair.nodes[0]),
+                    PairKind::EdgeEdge => {
+                        0.5 * (bodies[0].surface.edge_area(pair.elements[0])
+                            + bodies[1].surface.edge_area(pair.elements[1]))
+                    }
+                };
+                candidates.push(candidate(pair, gap, normal, area, bodies, time_step));
+            }
+        }
+        for node in penetration {
+            let bodies = [view(node.body), view(node.into_body)];
+            if bodies[0].parameters.rigid && bodies[1].parameters.rigid {
+                continue;
+            }
+            let [a, b, c] = bodies[1].surface.mesh().triangles()[node.triangle as usize];
+            let [wa, wb, wc] = node.weights;
+            let pair = ProximityPair {
+                kind: PairKind::VertexTriangle,
+                bodies: [node.body, node.into_body],
+                elements: [node.node, node.triangle],
+                nodes: [node.node, a, b, c],
+                weights: [1.0, -wa, -wb, -wc],
+                normal: node.direction,
+                distance: node.depth,
+            };
+            let area = bodies[0].surface.node_area(node.node);
+            let normal = DVec3::from_array(node.direction);
+            candidates.push(candidate(&pair, -node.depth, normal, area, bodies, time_step));
+        }
+    }
+
+    /// Gap and normal of a node against a triangle, if the pair is a contact.
+    fn vertex_triangle(
+        &self,
+        pair: &ProximityPair,
+        [own, other]: [BodyView<'_>; 2],
+    ) -> Option<(f64, DVec3)> {
+        let key = (pair.bodies[0], pair.nodes[0], pair.bodies[1]);
+        if self.inside.binary_search(&key).is_ok() {
+            return None;
+        }
+        let mut normal = DVec3::from_array(pair.normal);
+        let mut gap = pair.distance;
+        let node = pair.nodes[0];
+        let (triangle, corners) = (pair.elements[1], &pair.nodes[1..]);
+        let weights = &pair.weights[1..];
+        let outward = match weights.iter().filter(|&&weight| weight != 0.0).count() {
+            3 => other.surface.triangle_normal(triangle, other.positions),
+            2 => {
+                let zero = weights.iter().position(|&weight| weight == 0.0)?;
+                let edge = other.surface.mesh().triangle_edges()[triangle as usize][(zero + 1) % 3];
+                let triangles = other.surface.edge_triangles(edge);
+                let from = other.at(corners[(zero + 1) % 3]);
+                let away = |&(_, node): &(u32, u32)| leads_away(other.at(node) - from, normal);
+                if triangles[0].0 != triangle || (gap > 0.0 && !triangles.iter().all(away)) {
+                    return None;
+                }
+                other.surface.edge_normal(edge, other.positions)
+            }
+            _ => {
+                let corner = corners[weights.iter().position(|&weight| weight != 0.0)?];
+                let from = other.at(corner);
+                let away = |&node: &u32| leads_away(other.at(node) - from, normal);
+                if other.surface.node_triangles(corner)[0] != triangle
+                    || (gap > 0.0 && !other.surface.node_neighbours(corner).iter().all(away))
+                {
+                    return None;
+                }
+                other.surface.node_normal(corner, other.positions)
+            }
+        };
+        let own_surface = pair.bodies[0] == pair.bodies[1];
+        let mut behind = other.surface.is_closed() && outward.dot(normal) < 0.0;
+        if own_surface {
+            let h = own.parameters.distance(own.parameters);
+            let apart = rest_distance(pair, [own, other]);
+            if apart < REST_NEIGHBOUR * h {
+                return None;
+            }
+            if behind && apart > PASSED_THROUGH * gap.max(h) {
+                // Through its own surface: pushed back the way it came.
+                (gap, normal, behind) = (-gap, -normal, false);
+            }
+        }
+        if behind {
+            return None;
+        }
+        let faces_away = own.surface.is_closed()
+            && own.surface.node_normal(node, own.positions).dot(normal) > FACING_LIMIT;
+        (!faces_away).then_some((gap, normal))
+    }
+}
+
+/// Gap and normal of an edge against an edge, if the pair is a contact.
+fn edge_edge(pair: &ProximityPair, [own, other]: [BodyView<'_>; 2]) -> Option<(f64, DVec3)> {
+    if pair.weights.contains(&0.0) {
+        return None;
+    }
+    let normal = DVec3::from_array(pair.normal);
+    let inside_cone = |body: &BodyView<'_>, edge: u32, from: u32, direction: DVec3| {
+        let triangles = body.surface.edge_triangles(edge);
+        let from = body.at(from);
+        let away = |&(_, node): &(u32, u32)| leads_away(body.at(node) - from, direction);
+        let convex = match triangles {
+            [(first, _), (second, _)] => {
+                let first = body.surface.triangle_normal(*first, body.positions);
+                let second = body.surface.triangle_normal(*second, body.positions);
+                let sharp = first.cross(second).length() > SHARP_EDGE || first.dot(second) < 0.0;
+                // Behind the edge of a closed surface is the inside of the body.
+                sharp && (!body.surface.is_closed() || (first + second).dot(direction) > 0.0)
+            }
+            _ => true,
+        };
+        convex && triangles.iter().all(away)
+    };
+    let kept = inside_cone(&own, pair.elements[0], pair.nodes[0], -normal)
+        && inside_cone(&other, pair.elements[1], pair.nodes[2], normal);
+    let neighbours = pair.bodies[0] == pair.bodies[1]
+        && rest_distance(pair, [own, other])
+            < REST_NEIGHBOUR * own.parameters.distance(own.parameters);
+    (kept && !neighbours).then_some((pair.distance, normal))
+}
+
+/// True when going along `step` does not come closer to a point in direction `normal`.
+fn leads_away(step: DVec3, normal: DVec3) -> bool {
+    step.dot(normal) <= ANGLE_SLACK * step.length()
+}
+
+/// Distance between the two contact points when the body is at rest [m].
+fn rest_distance(pair: &ProximityPair, bodies: [BodyView<'_>; 2]) -> f64 {
+    let mut difference = DVec3::ZERO;
+    for (corner, (&node, &weight)) in pair.nodes.iter().zip(&pair.weights).enumerate() {
+        difference += weight * bodies[side(pair.kind, corner)].rest(node);
+    }
+    difference.length()
+}
+
+fn candidate(
+    pair: &ProximityPair,
+    gap: f64,
+    normal: DVec3,
+    area: f64,
+    [own, other]: [BodyView<'_>; 2],
+    time_step: f64,
+) -> Candidate {
+    let (a, b) = (own.parameters, other.parameters);
+    let distance = a.distance(b);
+    // Both surfaces of a soft pair bring contacts to the same patch.
+    let share = if a.rigid || b.rigid { 1.0 } else { 0.5 };
+    Candidate {
+        kind: pair.kind,
+        bodies: pair.bodies,
+        nodes: pair.nodes,
+        weights: pair.weights,
+        normal,
+        gap,
+        distance,
+        stiffness: share * area * a.stiffness(b),
+        recovery: gap + distance * time_step / RECOVERY_TIME,
+        friction: a.friction(b),
+    }
+}

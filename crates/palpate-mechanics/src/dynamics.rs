@@ -1,0 +1,512 @@
+//! The bodies in motion: two calls per step, with contact detection by the caller between them.
+
+use std::time::{Duration, Instant};
+
+use palpate_contact::{PenetratingNode, ProximityPair};
+use palpate_geometry::Point;
+use palpate_model::Model;
+use palpate_solver::FactorStats;
+use rayon::prelude::*;
+
+use crate::body::{MovingBody, first_not_finite};
+use crate::contact::filter::BodyView;
+use crate::contact::response::Response;
+use crate::contact::{Contact, ContactParameters, Surface};
+use crate::energy::{Energy, Momentum};
+use crate::error::MechanicsError;
+use crate::state::{BodyState, State};
+
+/// Motion margin of a search, in mean edges of the finer deformable surface: contacts farther
+/// ahead are found in a later step, or as penetrations.
+const MARGIN_LIMIT: f64 = 3.0;
+
+/// How the bodies are stepped.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DynamicsOptions {
+    /// Length of a step [s].
+    pub time_step: f64,
+    /// Worker threads; results are the same bits at any count.
+    pub threads: usize,
+}
+
+impl Default for DynamicsOptions {
+    fn default() -> Self {
+        Self { time_step: 1.0 / 60.0, threads: 1 }
+    }
+}
+
+/// Wall-clock time of the stages of a step.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct StageTimes {
+    /// Prediction and the solve without contact.
+    pub predict: Duration,
+    /// Which pairs are contacts.
+    pub filter: Duration,
+    /// Compliance columns that were not known yet.
+    pub compliance: Duration,
+    /// The contact forces.
+    pub solve: Duration,
+    /// Response to the contact forces and the new state.
+    pub advance: Duration,
+}
+
+/// What a step did and what it cost.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct StepStats {
+    /// Possible contacts that the solver was given.
+    pub candidates: usize,
+    /// Contacts that carry a force.
+    pub contacts: usize,
+    /// Those of them within one body.
+    pub self_contacts: usize,
+    /// Linear systems solved for the contact forces.
+    pub iterations: usize,
+    /// Rounds of guessing which contacts push, stick and slide.
+    pub newton_iterations: usize,
+    /// Residual of the contact equations relative to their right-hand side.
+    pub residual: f64,
+    /// Compliance columns that had to be solved.
+    pub new_columns: usize,
+    /// Where the time went.
+    pub times: StageTimes,
+}
+
+/// Bodies that deform, move and touch.
+///
+/// ```
+/// use palpate_mechanics::{Dynamics, DynamicsOptions};
+/// # use std::sync::Arc;
+/// # use palpate_model::{Body, Mesh, MeshData, Model, Structure::Body as Leaf};
+/// # let nodes = vec![[0.0; 3], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 0.1]];
+/// # let data = MeshData { nodes, tetrahedra: vec![[0, 1, 2, 3]], ..MeshData::default() };
+/// # let body = Body::new("falling", Arc::new(Mesh::new(data)?));
+/// # let model = Model { bodies: vec![body], structure: Leaf(0), gravity: [0.0, 0.0, -9.81] };
+/// let mut dynamics = Dynamics::new(&model, DynamicsOptions::default())?;
+/// dynamics.begin_step();
+/// let (proximity, penetration) = (Vec::new(), Vec::new()); // from contact detection
+/// dynamics.finish_step(&proximity, &penetration)?;
+/// assert!(dynamics.velocities(0)[0][2] < 0.0);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub struct Dynamics {
+    options: DynamicsOptions,
+    pool: Option<rayon::ThreadPool>,
+    /// Bodies by the task that steps them, and where each body is.
+    tasks: Vec<Vec<MovingBody>>,
+    places: Vec<(u32, u32)>,
+    surfaces: Vec<Surface>,
+    parameters: Vec<ContactParameters>,
+    response: Response,
+    start_time: f64,
+    start_step: u64,
+    step: u64,
+    predict_time: Duration,
+}
+
+impl Dynamics {
+    /// Assembles and factors every body of `model`.
+    ///
+    /// # Errors
+    /// If a body cannot be simulated: no tetrahedra and not rigid, a node in no tetrahedron, a
+    /// parameter out of range, a matrix that cannot be factored. The error names the body.
+    pub fn new(model: &Model, options: DynamicsOptions) -> Result<Self, MechanicsError> {
+        let time_step = options.time_step;
+        if !(time_step.is_finite() && time_step > 0.0) {
+            return Err(MechanicsError::TimeStep(time_step));
+        }
+        if !model.gravity.iter().all(|g| g.is_finite()) {
+            return Err(MechanicsError::Gravity);
+        }
+        let mut bodies = Vec::with_capacity(model.bodies.len());
+        let mut parameters = Vec::with_capacity(model.bodies.len());
+        for (index, body) in model.bodies.iter().enumerate() {
+            bodies.push(MovingBody::new(index, body, model.gravity, time_step)?);
+            parameters.push(ContactParameters::new(index, body)?);
+        }
+        let task_of = assign_tasks(model, options.threads.max(1));
+        let task_count = task_of.iter().max().map_or(0, |last| last + 1);
+        let mut tasks: Vec<Vec<MovingBody>> = Vec::new();
+        tasks.resize_with(task_count, Vec::new);
+        let mut places = Vec::with_capacity(bodies.len());
+        for (body, task) in bodies.into_iter().zip(task_of) {
+            places.push((task as u32, tasks[task].len() as u32));
+            tasks[task].push(body);
+        }
+        let pool = (options.threads > 1).then(|| {
+            rayon::ThreadPoolBuilder::new()
+                .num_threads(options.threads)
+                .build()
+                .expect("threads can be started")
+        });
+        Ok(Self {
+            options,
+            pool,
+            tasks,
+            places,
+            surfaces: model.bodies.iter().map(|body| Surface::new(&body.mesh)).collect(),
+            parameters,
+            response: Response::default(),
+            start_time: 0.0,
+            start_step: 0,
+            step: 0,
+            predict_time: Duration::ZERO,
+        })
+    }
+
+    /// How the bodies are stepped.
+    pub fn options(&self) -> DynamicsOptions {
+        self.options
+    }
+
+    /// Number of bodies.
+    pub fn body_count(&self) -> usize {
+        self.places.len()
+    }
+
+    fn body(&self, body: usize) -> &MovingBody {
+        let (task, place) = self.places[body];
+        &self.tasks[task as usize][place as usize]
+    }
+
+    fn body_mut(&mut self, body: usize) -> &mut MovingBody {
+        let (task, place) = self.places[body];
+        &mut self.tasks[task as usize][place as usize]
+    }
+
+    /// Runs `work(index, body)` for every body, the bodies of one task in turn.
+    fn for_each_body(&mut self, work: impl Fn(usize, &mut MovingBody) + Sync) {
+        let run = |task: &mut Vec<MovingBody>| {
+            for body in task {
+                work(body.index, body);
+            }
+        };
+        match &self.pool {
+            Some(pool) => pool.install(|| self.tasks.par_iter_mut().for_each(run)),
+            None => self.tasks.iter_mut().for_each(run),
+        }
+    }
+
+    /// Moves every body as if it were alone, which tells how far to look for contacts.
+    pub fn begin_step(&mut self) {
+        let start = Instant::now();
+        let end = self.time_at(self.step + 1);
+        let surfaces = std::mem::take(&mut self.surfaces);
+        self.for_each_body(|index, body| {
+            body.predict(surfaces[index].mesh().surface_nodes(), end);
+        });
+        self.surfaces = surfaces;
+        self.predict_time = start.elapsed();
+    }
+
+    /// Distance [m] within which surface elements of two bodies can come into contact in the step
+    /// that has begun; `None` for pairs that need no test: two rigid bodies, or one body whose
+    /// self-contact is off.
+    ///
+    /// # Panics
+    /// If a body does not exist.
+    pub fn search_distance(&self, body_a: usize, body_b: usize) -> Option<f64> {
+        let (a, b) = (&self.parameters[body_a], &self.parameters[body_b]);
+        if (a.rigid && b.rigid) || (body_a == body_b && !a.self_contact) {
+            return None;
+        }
+        let (first, second) = (self.body(body_a).motion, self.body(body_b).motion);
+        let margin = if body_a == body_b {
+            2.0 * first.deformation
+        } else {
+            (first.mean - second.mean).length() + first.spread + second.spread
+        };
+        let limit = MARGIN_LIMIT * a.soft_edge().min(b.soft_edge());
+        Some(a.distance(b) + margin.min(limit))
+    }
+
+    /// Solves for the contact forces and moves the bodies to the end of the step.
+    ///
+    /// `proximity` must hold every pair within [`Dynamics::search_distance`] at the current
+    /// positions, `penetration` every surface node inside another body.
+    ///
+    /// # Errors
+    /// If the state would not be finite; the state is then that before [`Dynamics::begin_step`].
+    ///
+    /// # Panics
+    /// If a pair names a body or node that does not exist.
+    pub fn finish_step(
+        &mut self,
+        proximity: &[ProximityPair],
+        penetration: &[PenetratingNode],
+    ) -> Result<StepStats, MechanicsError> {
+        let mut response = std::mem::take(&mut self.response);
+        let result = self.finish_with(&mut response, proximity, penetration);
+        self.response = response;
+        result
+    }
+
+    fn finish_with(
+        &mut self,
+        response: &mut Response,
+        proximity: &[ProximityPair],
+        penetration: &[PenetratingNode],
+    ) -> Result<StepStats, MechanicsError> {
+        let mut stats = StepStats::default();
+        stats.times.predict = self.predict_time;
+        let time_step = self.options.time_step;
+
+        let start = Instant::now();
+        response.find(
+            proximity,
+            penetration,
+            self.body_count(),
+            time_step,
+            |body| self.body(body),
+            |body| BodyView {
+                surface: &self.surfaces[body],
+                parameters: &self.parameters[body],
+                positions: &self.body(body).positions,
+            },
+        );
+        stats.candidates = response.candidate_count();
+        stats.times.filter = start.elapsed();
+
+        let start = Instant::now();
+        let step = self.step;
+        let problem = response.problem();
+        self.for_each_body(|index, body| body.prepare_compliance(problem.nodes(index), step));
+        stats.new_columns = (0..self.body_count()).map(|body| self.body(body).new_columns).sum();
+        stats.times.compliance = start.elapsed();
+
+        let start = Instant::now();
+        let cost = response.solve(|body| self.body(body)).map_err(MechanicsError::Contact)?;
+        (stats.iterations, stats.newton_iterations) = (cost.systems, cost.rounds);
+        stats.residual = cost.residual;
+        stats.contacts = response.contacts().len();
+        stats.self_contacts =
+            response.contacts().iter().filter(|c| c.bodies[0] == c.bodies[1]).count();
+        stats.times.solve = start.elapsed();
+
+        let start = Instant::now();
+        self.apply_contact_forces(response.contacts());
+        self.for_each_body(|_, body| body.advance(time_step));
+        for index in 0..self.body_count() {
+            if let Some(node) = self.body(index).first_broken_node() {
+                let what = "the state after the step";
+                return Err(MechanicsError::NotFinite { body: index, node, what });
+            }
+        }
+        self.for_each_body(|_, body| body.commit());
+        self.step += 1;
+        stats.times.advance = start.elapsed();
+        Ok(stats)
+    }
+
+    fn apply_contact_forces(&mut self, contacts: &[Contact]) {
+        for index in 0..self.body_count() {
+            let body = self.body_mut(index);
+            if body.touched {
+                body.contact_forces.fill([0.0; 3]);
+            }
+            body.touched = false;
+        }
+        for contact in contacts {
+            let force = contact.force();
+            for corner in 0..4 {
+                let body = self.body_mut(contact.body_of(corner));
+                body.touched = true;
+                let sum = &mut body.contact_forces[contact.nodes[corner] as usize];
+                for k in 0..3 {
+                    sum[k] += contact.weights[corner] * force[k];
+                }
+            }
+        }
+    }
+
+    fn time_at(&self, step: u64) -> f64 {
+        self.start_time + (step - self.start_step) as f64 * self.options.time_step
+    }
+
+    /// Simulated time [s].
+    pub fn time(&self) -> f64 {
+        self.time_at(self.step)
+    }
+
+    /// Steps taken.
+    pub fn step_count(&self) -> u64 {
+        self.step
+    }
+
+    /// Node positions [m] of a body.
+    ///
+    /// # Panics
+    /// If the body does not exist, as every function here that takes a body.
+    pub fn positions(&self, body: usize) -> &[Point] {
+        &self.body(body).positions
+    }
+
+    /// Node velocities [m/s] of a body.
+    pub fn velocities(&self, body: usize) -> &[Point] {
+        &self.body(body).velocities
+    }
+
+    /// External nodal forces [N] of a body.
+    pub fn forces(&self, body: usize) -> &[Point] {
+        &self.body(body).forces
+    }
+
+    /// Contact force [N] on each node of a body in the last step.
+    pub fn contact_force(&self, body: usize) -> &[Point] {
+        &self.body(body).contact_forces
+    }
+
+    /// Contacts that carried a force in the last step.
+    pub fn contacts(&self) -> &[Contact] {
+        self.response.contacts()
+    }
+
+    /// Moves the nodes of a body to `positions` [m]. Fixed nodes stay where they are put; a rigid
+    /// body goes on to its prescribed pose in the next step.
+    ///
+    /// # Errors
+    /// If there is not one finite position per node; nothing has changed then.
+    pub fn set_positions(
+        &mut self,
+        body: usize,
+        positions: &[Point],
+    ) -> Result<(), MechanicsError> {
+        check_array(body, self.positions(body).len(), positions, "the position")?;
+        self.body_mut(body).positions.copy_from_slice(positions);
+        Ok(())
+    }
+
+    /// Sets the node velocities [m/s] of a body; those of fixed nodes are ignored.
+    ///
+    /// # Errors
+    /// If there is not one finite velocity per node; nothing has changed then.
+    pub fn set_velocities(
+        &mut self,
+        body: usize,
+        velocities: &[Point],
+    ) -> Result<(), MechanicsError> {
+        check_array(body, self.positions(body).len(), velocities, "the velocity")?;
+        self.body_mut(body).velocities.copy_from_slice(velocities);
+        Ok(())
+    }
+
+    /// Sets external forces [N] on the nodes of a body, which act until they are changed.
+    ///
+    /// # Errors
+    /// If there is not one finite force per node; nothing has changed then.
+    pub fn set_forces(&mut self, body: usize, forces: &[Point]) -> Result<(), MechanicsError> {
+        check_array(body, self.positions(body).len(), forces, "the force")?;
+        self.body_mut(body).forces.copy_from_slice(forces);
+        Ok(())
+    }
+
+    /// Everything the next step depends on.
+    pub fn state(&self) -> State {
+        let bodies = (0..self.body_count()).map(|index| {
+            let body = self.body(index);
+            BodyState {
+                positions: body.positions.clone(),
+                velocities: body.velocities.clone(),
+                forces: body.forces.clone(),
+            }
+        });
+        State { time: self.time(), step: self.step, bodies: bodies.collect() }
+    }
+
+    /// Goes back to `state`; contacts and contact forces are cleared.
+    ///
+    /// # Errors
+    /// If the state belongs to other bodies or is not finite; nothing has changed then.
+    pub fn set_state(&mut self, state: &State) -> Result<(), MechanicsError> {
+        let (expected, found) = (self.body_count(), state.bodies.len());
+        if expected != found {
+            return Err(MechanicsError::WrongBodyCount { expected, found });
+        }
+        for (body, saved) in state.bodies.iter().enumerate() {
+            let count = self.positions(body).len();
+            check_array(body, count, &saved.positions, "the position")?;
+            check_array(body, count, &saved.velocities, "the velocity")?;
+            check_array(body, count, &saved.forces, "the force")?;
+        }
+        for (index, saved) in state.bodies.iter().enumerate() {
+            let body = self.body_mut(index);
+            body.positions.copy_from_slice(&saved.positions);
+            body.velocities.copy_from_slice(&saved.velocities);
+            body.forces.copy_from_slice(&saved.forces);
+            body.contact_forces.fill([0.0; 3]);
+        }
+        self.response.clear_contacts();
+        (self.start_time, self.start_step, self.step) = (state.time, state.step, state.step);
+        Ok(())
+    }
+
+    /// Energy of the deformable bodies.
+    pub fn energy(&self) -> Energy {
+        let mut energy = Energy::default();
+        for index in 0..self.body_count() {
+            energy.add(self.body(index));
+        }
+        energy
+    }
+
+    /// Momentum of all deformable bodies together.
+    pub fn momentum(&self) -> Momentum {
+        let mut momentum = Momentum::default();
+        for index in 0..self.body_count() {
+            momentum.add(self.body(index));
+        }
+        momentum
+    }
+
+    /// Mass of each node of a body [kg]; `None` for a rigid one.
+    pub fn masses(&self, body: usize) -> Option<&[f64]> {
+        self.body(body).elastic().map(crate::body::ElasticBody::masses)
+    }
+
+    /// Size and cost of a body's factor; `None` for a rigid one.
+    pub fn factor_stats(&self, body: usize) -> Option<FactorStats> {
+        self.body(body).elastic().map(crate::body::ElasticBody::factor_stats)
+    }
+}
+
+fn check_array(
+    body: usize,
+    expected: usize,
+    vectors: &[Point],
+    what: &'static str,
+) -> Result<(), MechanicsError> {
+    if vectors.len() != expected {
+        return Err(MechanicsError::WrongCount { body, expected, found: vectors.len() });
+    }
+    match first_not_finite(vectors) {
+        Some(node) => Err(MechanicsError::NotFinite { body, node, what }),
+        None => Ok(()),
+    }
+}
+
+/// The task of each body: one per processor that the model names, in turn over the threads; the
+/// others go, largest first, to the task with the fewest nodes.
+fn assign_tasks(model: &Model, threads: usize) -> Vec<usize> {
+    let mut processors: Vec<u32> = model.bodies.iter().filter_map(|body| body.processor).collect();
+    processors.sort_unstable();
+    processors.dedup();
+    let mut load = vec![0; threads];
+    let mut task_of = vec![0; model.bodies.len()];
+    let mut unassigned = Vec::new();
+    for (index, body) in model.bodies.iter().enumerate() {
+        match body.processor {
+            Some(id) => {
+                let rank = processors.binary_search(&id).expect("collected above");
+                task_of[index] = rank % threads;
+                load[rank % threads] += body.mesh.nodes().len();
+            }
+            None => unassigned.push(index),
+        }
+    }
+    unassigned.sort_by_key(|&index| std::cmp::Reverse(model.bodies[index].mesh.nodes().len()));
+    for index in unassigned {
+        let task = (0..threads).min_by_key(|&task| load[task]).expect("at least one thread");
+        task_of[index] = task;
+        load[task] += model.bodies[index].mesh.nodes().len();
+    }
+    task_of
+}

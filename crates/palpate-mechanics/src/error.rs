@@ -1,0 +1,91 @@
+//! Why bodies cannot be simulated.
+
+use palpate_solver::FactorError;
+
+/// Why a model, a state or a step was refused.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum MechanicsError {
+    /// A surface-only mesh that is not rigid.
+    #[error(
+        "body {body} '{name}' has no tetrahedra, so it cannot deform: make it rigid or give it a \
+         tetrahedral mesh"
+    )]
+    NoTetrahedra {
+        /// Index of the body.
+        body: usize,
+        /// Its name.
+        name: String,
+    },
+    /// A node of a deformable body without mass.
+    #[error("node {node} of body {body} '{name}' belongs to no tetrahedron: remove it")]
+    LooseNode {
+        /// Index of the body.
+        body: usize,
+        /// Its name.
+        name: String,
+        /// The first such node.
+        node: usize,
+    },
+    /// A parameter outside its range.
+    #[error("{what} of body {body} '{name}' is {value}; expected {expected}")]
+    BadParameter {
+        /// Index of the body.
+        body: usize,
+        /// Its name.
+        name: String,
+        /// Name of the parameter.
+        what: &'static str,
+        /// What was given.
+        value: f64,
+        /// The valid range.
+        expected: &'static str,
+    },
+    /// The stiffness matrix of a body could not be factored.
+    #[error("body {body} '{name}': {source}")]
+    Factor {
+        /// Index of the body.
+        body: usize,
+        /// Its name.
+        name: String,
+        /// What went wrong.
+        source: FactorError,
+    },
+    /// A time step that is not positive and finite.
+    #[error("the time step is {0} s; expected a positive number")]
+    TimeStep(f64),
+    /// Gravity with an infinite or undefined component.
+    #[error("gravity must be finite")]
+    Gravity,
+    /// An array whose length is not the body's number of nodes.
+    #[error("body {body} has {expected} nodes, but {found} entries were given")]
+    WrongCount {
+        /// Index of the body.
+        body: usize,
+        /// Nodes of the body.
+        expected: usize,
+        /// Entries given.
+        found: usize,
+    },
+    /// A state with another number of bodies.
+    #[error("the state holds {found} bodies, the model has {expected}")]
+    WrongBodyCount {
+        /// Bodies of the model.
+        expected: usize,
+        /// Bodies of the state.
+        found: usize,
+    },
+    /// NaN or infinity in what was given, or as the result of a step.
+    #[error("{what} of node {node} of body {body} is not finite")]
+    NotFinite {
+        /// Index of the body.
+        body: usize,
+        /// The first such node.
+        node: usize,
+        /// Positions, velocities or forces.
+        what: &'static str,
+    },
+    /// The contact equations have no usable solution.
+    #[error("the contact equations cannot be solved: {0}")]
+    Contact(FactorError),
+}
