@@ -20,7 +20,7 @@ const FRAMES: usize = 40;
 
 fn bodies() -> Result<Vec<Arc<Mesh>>, Box<dyn std::error::Error>> {
     let Some(folder) = std::env::var_os("PALPATE_DATA") else {
-        return Ok((0..4).map(|i| horseshoe(30, 8, [5.0 * f64::from(i), 0.0, 0.0])).collect());
+        return Ok((0..4).map(|i| horseshoe(30, 8, [8.5 * f64::from(i), 0.0, 0.0])).collect());
     };
     let organs = ["aorta", "kidney_l", "kidney_r", "vena_cava"];
     let path = |organ| PathBuf::from(&folder).join(format!("organs/{organ}_n2500.vtk"));
@@ -77,9 +77,13 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         (Method::Paper, Split::Middle, 3),
         (Method::Paper, Split::Middle, 5),
         (Method::Paper, Split::Middle, 10),
+        (Method::Paper, Split::Middle, 15),
+        (Method::Paper, Split::Middle, 20),
+        (Method::Paper, Split::Middle, 40),
         (Method::Paper, Split::Count, 1),
         (Method::Paper, Split::Count, 2),
         (Method::Paper, Split::Count, 5),
+        (Method::Paper, Split::Count, 10),
         (Method::Hash, Split::Middle, 2),
     ] {
         let options = SceneOptions { method, split, leaf_size, ..SceneOptions::default() };

@@ -232,26 +232,38 @@ fn triangle_pairs(
     let same_leaf = pair.is_self() && leaves.leaf_a == leaves.leaf_b;
     for i in node_a.triangles[0]..node_a.triangles[1] {
         let near = widened(tree_a.triangle_bounds(i), pair.margin);
+        if !meets(&near, &node_b.bounds) {
+            continue;
+        }
         let first = if same_leaf { i + 1 } else { node_b.triangles[0] };
         for j in first..node_b.triangles[1] {
             cost.box_tests += 1;
-            if near.intersects(tree_b.triangle_bounds(j)) {
+            if meets(&near, tree_b.triangle_bounds(j)) {
                 found([i, j], cost);
             }
         }
     }
 }
 
-/// `bounds` grown by `margin` on all sides, never less.
+/// `bounds` grown by `margin` on all sides. The margin of [`BodyPair::within`] is itself generous enough
+/// for the rounding of this.
 #[inline]
 pub(crate) fn widened(bounds: &Aabb, margin: f64) -> Aabb {
-    if margin == 0.0 {
-        return *bounds;
-    }
     Aabb {
-        min: bounds.min.map(|value| (value - margin).next_down()),
-        max: bounds.max.map(|value| (value + margin).next_up()),
+        min: bounds.min.map(|value| value - margin),
+        max: bounds.max.map(|value| value + margin),
     }
+}
+
+/// [`Aabb::intersects`] without branches: in a traversal none of its comparisons can be predicted.
+#[inline]
+pub(crate) fn meets(a: &Aabb, b: &Aabb) -> bool {
+    let mut meet = true;
+    for axis in 0..3 {
+        meet &= a.min[axis] <= b.max[axis];
+        meet &= b.min[axis] <= a.max[axis];
+    }
+    meet
 }
 
 /// Runs `work` on each item, on the pool's threads if there is one.

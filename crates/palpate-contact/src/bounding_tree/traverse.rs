@@ -3,6 +3,7 @@
 use palpate_geometry::Aabb;
 
 use super::BoundingTree;
+use crate::leaf_pairs::meets;
 
 impl BoundingTree {
     /// Calls `found` with each leaf at or after node `start` whose box meets `bounds`, and returns the
@@ -21,7 +22,7 @@ impl BoundingTree {
         let mut index = start;
         while let Some(node) = self.nodes.get(index as usize) {
             visited += 1;
-            if !node.bounds.intersects(bounds) {
+            if !meets(&node.bounds, bounds) {
                 index = node.skip;
                 continue;
             }

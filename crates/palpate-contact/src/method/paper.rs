@@ -6,7 +6,7 @@ use palpate_geometry::{Aabb, triangles_intersect};
 
 use super::{Detector, DistanceOf};
 use crate::bounding_tree::corner_points;
-use crate::leaf_pairs::{BodyPair, Cost, LeafPairSearch, share_a_node, widened};
+use crate::leaf_pairs::{BodyPair, Cost, LeafPairSearch, meets, share_a_node, widened};
 use crate::pairs::{ProximityPair, TrianglePair};
 use crate::proximity::{edge_pair, sort, vertex_triangle};
 use crate::scene::{Frame, IntersectionOptions, Intersections, Proximity, SceneBody};
@@ -111,38 +111,61 @@ pub(crate) fn meeting_triangles(
 struct Side<'a> {
     body: u32,
     scene_body: &'a SceneBody,
-    triangle: u32,
+    position: u32,
     corners: [u32; 3],
+    /// Owned nodes (bits 0 to 2) and edges (bits 3 to 5).
     owned: u8,
     bounds: &'a Aabb,
 }
 
+/// An edge of a triangle: its number there, its nodes, its box.
+#[derive(Clone, Copy)]
+struct Edge {
+    side: usize,
+    nodes: [u32; 2],
+    bounds: Aabb,
+}
+
 impl<'a> Side<'a> {
+    #[inline]
     fn new(bodies: &'a [SceneBody], body: u32, position: u32) -> Self {
         let scene_body = &bodies[body as usize];
         Self {
             body,
             scene_body,
-            triangle: scene_body.tree.triangle_order()[position as usize],
+            position,
             corners: scene_body.tree.corners(position),
             owned: scene_body.surface.owned[position as usize],
             bounds: scene_body.tree.triangle_bounds(position),
         }
     }
 
-    fn owned_nodes(&self) -> impl Iterator<Item = u32> {
-        (0..3).filter(|i| self.owned >> i & 1 == 1).map(|i| self.corners[i])
+    fn triangle(&self) -> u32 {
+        self.scene_body.tree.triangle_order()[self.position as usize]
     }
 
-    /// The owned edges that come within `margin` of `other`.
-    fn owned_edges(&self, other: &Aabb, margin: f64) -> impl Iterator<Item = (u32, Aabb)> {
-        let edges = self.scene_body.mesh.triangle_edges()[self.triangle as usize];
-        (0..3).filter(|i| self.owned >> (3 + i) & 1 == 1).filter_map(move |i| {
-            let ends = [self.corners[i], self.corners[(i + 1) % 3]];
-            let points = ends.map(|node| self.scene_body.positions[node as usize]);
-            let near = widened(&Aabb::from_points(&points), margin);
-            near.intersects(other).then_some((edges[i], near))
-        })
+    fn edge_index(&self, edge: &Edge) -> u32 {
+        self.scene_body.mesh.triangle_edges()[self.triangle() as usize][edge.side]
+    }
+
+    /// Puts the owned edges that come within `margin` of `other` into `edges` and returns them.
+    #[inline]
+    fn owned_edges<'e>(&self, other: &Aabb, margin: f64, edges: &'e mut [Edge; 3]) -> &'e [Edge] {
+        let near = widened(other, margin);
+        let mut count = 0;
+        for side in (0..3).filter(|side| self.owned >> (3 + side) & 1 == 1) {
+            let nodes = [self.corners[side], self.corners[(side + 1) % 3]];
+            let [a, b] = nodes.map(|node| self.scene_body.positions[node as usize]);
+            let bounds = Aabb {
+                min: std::array::from_fn(|axis| a[axis].min(b[axis])),
+                max: std::array::from_fn(|axis| a[axis].max(b[axis])),
+            };
+            if meets(&bounds, &near) {
+                edges[count] = Edge { side, nodes, bounds };
+                count += 1;
+            }
+        }
+        &edges[..count]
     }
 }
 
@@ -158,21 +181,41 @@ fn close_features(
     let b = Side::new(bodies, pair.b, j);
     let margin_squared = pair.margin * pair.margin * (1.0 + 1e-9);
     for (from, to) in [(&a, &b), (&b, &a)] {
-        for node in from.owned_nodes() {
+        for corner in (0..3).filter(|corner| from.owned >> corner & 1 == 1) {
+            let node = from.corners[corner];
             let point = &from.scene_body.positions[node as usize];
-            if to.bounds.distance_squared(point) <= margin_squared {
-                cost.polygon_tests += 1;
-                let elements = [node, to.triangle];
-                let bodies_of_pair = [from.body, to.body];
-                found.extend(vertex_triangle(bodies, bodies_of_pair, elements, pair.distance));
+            if pair.is_self() && to.corners.contains(&node)
+                || to.bounds.distance_squared(point) > margin_squared
+            {
+                continue;
             }
+            cost.polygon_tests += 1;
+            let elements = [node, to.triangle()];
+            found.extend(vertex_triangle(bodies, [from.body, to.body], elements, pair.distance));
         }
     }
-    for (edge_a, near_a) in a.owned_edges(b.bounds, pair.margin) {
-        for (edge_b, _) in b.owned_edges(&near_a, 0.0) {
+    if a.owned >> 3 == 0 || b.owned >> 3 == 0 {
+        return;
+    }
+    let none = Edge { side: 0, nodes: [0; 2], bounds: Aabb::EMPTY };
+    let (mut edges_a, mut edges_b) = ([none; 3], [none; 3]);
+    let edges_a = a.owned_edges(b.bounds, pair.margin, &mut edges_a);
+    if edges_a.is_empty() {
+        return;
+    }
+    let edges_b = b.owned_edges(a.bounds, pair.margin, &mut edges_b);
+    for edge_a in edges_a {
+        let near_a = widened(&edge_a.bounds, pair.margin);
+        for edge_b in edges_b {
+            let shared = pair.is_self() && edge_a.nodes.iter().any(|n| edge_b.nodes.contains(n));
+            if shared || !meets(&near_a, &edge_b.bounds) {
+                continue;
+            }
             cost.polygon_tests += 1;
-            let swapped = pair.is_self() && edge_b < edge_a;
-            let edges = if swapped { [edge_b, edge_a] } else { [edge_a, edge_b] };
+            let mut edges = [a.edge_index(edge_a), b.edge_index(edge_b)];
+            if pair.is_self() {
+                edges.sort_unstable();
+            }
             found.extend(edge_pair(bodies, [pair.a, pair.b], edges, pair.distance));
         }
     }

@@ -2,6 +2,7 @@
 
 mod intersections;
 mod organs;
+mod parry;
 mod penetration;
 mod proximity;
 mod scene;
