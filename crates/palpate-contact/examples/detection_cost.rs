@@ -68,25 +68,26 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     }
     writeln!(
         out,
-        "\nmethod split     K      P | ms: refit  traverse  polygons |   self  tests  fraction | \
+        "\nmethod split  threads  K      P | ms: refit  traverse  polygons |   self  tests  fraction | \
          close 5 %   20 %  (pairs) | inside  (nodes)"
     )?;
-    for (method, split, leaf_size) in [
-        (Method::Paper, Split::Middle, 1),
-        (Method::Paper, Split::Middle, 2),
-        (Method::Paper, Split::Middle, 3),
-        (Method::Paper, Split::Middle, 5),
-        (Method::Paper, Split::Middle, 10),
-        (Method::Paper, Split::Middle, 15),
-        (Method::Paper, Split::Middle, 20),
-        (Method::Paper, Split::Middle, 40),
-        (Method::Paper, Split::Count, 1),
-        (Method::Paper, Split::Count, 2),
-        (Method::Paper, Split::Count, 5),
-        (Method::Paper, Split::Count, 10),
-        (Method::Hash, Split::Middle, 2),
+    for (method, split, leaf_size, threads) in [
+        (Method::Paper, Split::Middle, 1, 1),
+        (Method::Paper, Split::Middle, 2, 1),
+        (Method::Paper, Split::Middle, 3, 1),
+        (Method::Paper, Split::Middle, 5, 1),
+        (Method::Paper, Split::Middle, 10, 1),
+        (Method::Paper, Split::Middle, 15, 1),
+        (Method::Paper, Split::Middle, 20, 1),
+        (Method::Paper, Split::Middle, 40, 1),
+        (Method::Paper, Split::Middle, 10, 2),
+        (Method::Paper, Split::Count, 1, 1),
+        (Method::Paper, Split::Count, 2, 1),
+        (Method::Paper, Split::Count, 5, 1),
+        (Method::Paper, Split::Count, 10, 1),
+        (Method::Hash, Split::Middle, 2, 1),
     ] {
-        let options = SceneOptions { method, split, leaf_size, ..SceneOptions::default() };
+        let options = SceneOptions { method, split, leaf_size, threads };
         let mut scene = Scene::new(meshes.clone(), None, options)?;
         let tree_nodes: usize = (0..4).map(|body| scene.tree(body).nodes().len()).sum();
         let mut times: [Vec<Duration>; 7] = std::array::from_fn(|_| Vec::new());
@@ -111,7 +112,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let [refit, traverse, polygons, own, near, wide, deep] = times.map(median);
         writeln!(
             out,
-            "{:6} {:6} {leaf_size:4} {tree_nodes:6} |   {refit:7.3} {traverse:9.3} {polygons:9.3} | \
+            "{:6} {:6} {threads:7} {leaf_size:4} {tree_nodes:6} |   {refit:7.3} {traverse:9.3} {polygons:9.3} | \
              {own:6.3} {:6} 1/{:<7.0} | {near:9.3} {wide:6.3} {pairs:8} | {deep:6.3} {inside:8}",
             format!("{method:?}"),
             format!("{split:?}"),

@@ -3,6 +3,28 @@
 //!
 //! [`Scene`] holds the bodies; each step [`Scene::update`] takes their positions, and
 //! [`Scene::intersections`], [`Scene::proximity`] and [`Scene::penetration`] answer what touches.
+//!
+//! ```
+//! use std::sync::Arc;
+//! use palpate_contact::{IntersectionOptions, Scene, SceneOptions};
+//! use palpate_model::{Mesh, MeshData};
+//!
+//! let tetrahedron = Arc::new(Mesh::new(MeshData {
+//!     nodes: vec![[0., 0., 0.], [1., 0., 0.], [0., 1., 0.], [0., 0., 1.]],
+//!     tetrahedra: vec![[0, 1, 2, 3]],
+//!     ..MeshData::default()
+//! })?);
+//! let meshes = vec![tetrahedron.clone(), tetrahedron.clone()];
+//! let mut scene = Scene::new(meshes, None, SceneOptions::default())?;
+//!
+//! let above: Vec<[f64; 3]> = tetrahedron.nodes().iter().map(|&[x, y, z]| [x, y, z + 1.25]).collect();
+//! scene.update(&[tetrahedron.nodes(), &above])?;
+//! assert!(scene.intersections(&IntersectionOptions::default()).pairs.is_empty());
+//! let close = scene.proximity(&|_, _| Some(0.3));
+//! assert!(close.pairs.iter().all(|pair| pair.distance == 0.25));
+//! # assert!(!close.pairs.is_empty());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 pub mod bounding_tree;
 mod leaf_pairs;

@@ -40,11 +40,8 @@ fn distances_of_close_pairs_agree() {
             PairKind::EdgeEdge => {
                 let (first, second) =
                     (Segment::new(at(a, 0), at(a, 1)), Segment::new(at(b, 2), at(b, 3)));
-                let (on_first, on_second) = closest_points_segment_segment_with_locations(
-                    &Pose::IDENTITY,
-                    &first,
-                    &second,
-                );
+                let (on_first, on_second) =
+                    closest_points_segment_segment_with_locations(&Pose::IDENTITY, &first, &second);
                 (first.point_at(&on_first) - second.point_at(&on_second)).length()
             }
         };
