@@ -1,13 +1,22 @@
 //! The model: bodies placed in space, how the text joins them, and what acts on all of them.
 
+mod pose;
+mod validate;
+
+use std::fmt;
 use std::path::PathBuf;
+use std::str::FromStr;
 use std::sync::Arc;
 
-use glam::{DMat3, DQuat, DVec3};
+use glam::{DQuat, DVec3};
 use palpate_geometry::Point;
 use serde::{Deserialize, Serialize};
 
+use crate::language::Document;
 use crate::mesh::Mesh;
+
+pub use pose::{Pose, PoseParts};
+pub use validate::BodyError;
 
 /// Everything a model file describes, loaded and placed.
 #[derive(Clone, Debug, Deserialize, Serialize)]
@@ -18,6 +27,33 @@ pub struct Model {
     pub structure: Structure,
     /// Acceleration of gravity [m/s²].
     pub gravity: Point,
+    /// What the readers of the mesh files had to say, one sentence each.
+    pub notes: Vec<String>,
+    /// The text that the model came from; `None` for bodies that came from arrays.
+    #[serde(skip)]
+    pub document: Option<Document>,
+}
+
+impl Model {
+    /// Bodies without a text: a chain of joins in their order, gravity down the z axis.
+    ///
+    /// # Panics
+    /// If there is no body.
+    pub fn from_bodies(bodies: Vec<Body>) -> Self {
+        let structure = Structure::chain((0..bodies.len()).map(Structure::Body));
+        Self {
+            structure: structure.expect("a model has at least one body"),
+            bodies,
+            gravity: Document::GRAVITY,
+            notes: Vec::new(),
+            document: None,
+        }
+    }
+
+    /// The model in canonical text; `None` when it came from arrays.
+    pub fn to_text(&self) -> Option<String> {
+        self.document.as_ref().map(Document::to_text)
+    }
 }
 
 /// The upper binary tree: connection elements (CE) down to the bodies (NE).
@@ -27,6 +63,13 @@ pub enum Structure {
     Body(usize),
     /// A connection element with its two subtrees; more than two children become a chain.
     Join(Box<Structure>, Box<Structure>),
+}
+
+impl Structure {
+    /// Joins subtrees two by two from the left, a, b, c to ((a b) c); `None` of nothing.
+    pub fn chain(children: impl IntoIterator<Item = Self>) -> Option<Self> {
+        children.into_iter().reduce(|left, right| Self::Join(Box::new(left), Box::new(right)))
+    }
 }
 
 /// One object of the model: a mesh in its place, and how it behaves.
@@ -75,38 +118,6 @@ impl Body {
     }
 }
 
-/// An affine map `x -> linear * x + translation`.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
-pub struct Pose {
-    /// Linear part: scale, then rotation, of every ME, inner first.
-    pub linear: DMat3,
-    /// Translation [m].
-    pub translation: DVec3,
-}
-
-impl Pose {
-    /// Leaves every point where it is.
-    pub const IDENTITY: Self = Self { linear: DMat3::IDENTITY, translation: DVec3::ZERO };
-
-    /// A rotation followed by a translation [m].
-    pub fn from_rotation_translation(rotation: DQuat, translation: DVec3) -> Self {
-        Self { linear: DMat3::from_quat(rotation), translation }
-    }
-
-    /// The map that applies `inner` first, then `self`.
-    pub fn after(&self, inner: &Self) -> Self {
-        Self {
-            linear: self.linear * inner.linear,
-            translation: self.linear * inner.translation + self.translation,
-        }
-    }
-
-    /// The image of a point.
-    pub fn apply(&self, point: Point) -> Point {
-        (self.linear * DVec3::from_array(point) + self.translation).to_array()
-    }
-}
-
 /// Constitutive law of a material.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[non_exhaustive]
@@ -114,6 +125,25 @@ pub enum Law {
     /// Linear elasticity in the body's own rotating frame.
     #[default]
     Linear,
+}
+
+impl fmt::Display for Law {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        out.write_str(match self {
+            Self::Linear => "linear",
+        })
+    }
+}
+
+impl FromStr for Law {
+    type Err = BodyError;
+
+    fn from_str(name: &str) -> Result<Self, BodyError> {
+        match name {
+            "linear" => Ok(Self::Linear),
+            _ => Err(BodyError::UnknownLaw(name.to_owned())),
+        }
+    }
 }
 
 /// Material of a body. The defaults are a generic soft organ.

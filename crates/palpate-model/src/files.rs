@@ -71,6 +71,14 @@ impl FileError {
         self.line
     }
 
+    /// The operating system's error, where that is what is wrong.
+    pub fn io_error(&self) -> Option<&io::Error> {
+        match &self.cause {
+            FileErrorCause::Io(error) => Some(error),
+            _ => None,
+        }
+    }
+
     /// What is wrong.
     pub fn cause(&self) -> &FileErrorCause {
         &self.cause

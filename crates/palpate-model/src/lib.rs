@@ -2,13 +2,18 @@
 
 pub mod body;
 pub mod files;
+pub mod language;
 pub mod mesh;
 mod number;
 
 pub use body::{
-    Appearance, Body, ContactSettings, Law, Material, Model, Pose, RigidKey, RigidMotion, Structure,
+    Appearance, Body, BodyError, ContactSettings, Law, Material, Model, Pose, PoseParts, RigidKey,
+    RigidMotion, Structure,
 };
 pub use files::{FileError, FileErrorCause, ReadMesh, ReadOptions, read_mesh, write_mesh};
+pub use language::{
+    CoreLoader, Diagnostic, Document, LoadError, MeshLoader, ModelError, load_model,
+};
 pub use mesh::{
     Defect, DefectKind, ElementKind, Indices, Mesh, MeshData, MeshError, NONE, NodeTriangles,
     QualitySummary, RepairReport, TETRAHEDRON_FACES,

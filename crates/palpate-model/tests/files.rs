@@ -86,7 +86,7 @@ const CORNER: &str = "seg 1\nnodes 4\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n";
 #[test]
 fn errors_of_seg_files_name_file_line_and_index() {
     let cases = [
-        ("".to_owned(), "empty"),
+        (String::new(), "empty"),
         ("nodes 4".to_owned(), "no header"),
         ("seg 2".to_owned(), "version"),
         (format!("{CORNER}tetrahedra 1\n0 1 2 99\n"), "out of range"),

@@ -1,0 +1,20 @@
+//! The bio-model description language of the paper (section 2), and our extensions to it.
+//!
+//! Text -> tokens -> [`Document`] (what the text says, checked) -> [`crate::Model`] (meshes loaded
+//! and placed). The language is described by example in docs/language.md.
+
+mod diagnostic;
+mod document;
+mod elements;
+mod lexer;
+mod load;
+mod near;
+mod parser;
+mod text;
+
+pub use diagnostic::{Diagnostic, ModelError, Span};
+pub use document::{
+    AppearanceEntries, Block, Branch, ContactEntries, Document, Fixed, FixedRegion,
+    MaterialEntries, PathKey, Rotation, Settings, Transform, Tree, Unit,
+};
+pub use load::{CoreLoader, LoadError, MeshLoader, load_model};
