@@ -231,19 +231,32 @@ impl Scene {
     /// # Errors
     /// If counts do not fit or a number is not finite; the scene is then unchanged.
     pub fn update(&mut self, positions: &[&[Point]]) -> Result<UpdateStats, SceneError> {
+        let expected = self.bodies.len();
+        if positions.len() != expected {
+            return Err(SceneError::BodyCount { given: positions.len(), expected });
+        }
+        self.update_from(|body| positions[body])
+    }
+
+    /// [`Self::update`] with the positions of each body, by its index, from a function: for callers
+    /// that keep them apart and want no list of them.
+    ///
+    /// # Errors
+    /// As [`Self::update`].
+    pub fn update_from<'a>(
+        &mut self,
+        positions: impl Fn(usize) -> &'a [Point] + Sync,
+    ) -> Result<UpdateStats, SceneError> {
         let start = Instant::now();
-        self.check_positions(positions)?;
-        let move_body = |body: &mut SceneBody, positions: &[Point]| {
-            body.positions.copy_from_slice(positions);
-            body.tree.refit(positions);
+        self.check_positions(&positions)?;
+        let move_body = |(index, body): (usize, &mut SceneBody)| {
+            body.positions.copy_from_slice(positions(index));
+            body.tree.refit(&body.positions);
         };
         if let Some(pool) = &self.pool {
-            let bodies = self.bodies.par_iter_mut().zip(positions);
-            pool.install(|| bodies.for_each(|(body, positions)| move_body(body, positions)));
+            pool.install(|| self.bodies.par_iter_mut().enumerate().for_each(move_body));
         } else {
-            for (body, positions) in self.bodies.iter_mut().zip(positions) {
-                move_body(body, positions);
-            }
+            self.bodies.iter_mut().enumerate().for_each(move_body);
         }
         self.upper.refit(|body| self.bodies[body].tree.bounds());
         let nodes_refitted = self.bodies.iter().map(|body| body.tree.nodes().len() as u64).sum();
@@ -319,18 +332,18 @@ impl Scene {
         if body < count { Ok(()) } else { Err(SceneError::BodyOutOfRange { body, count }) }
     }
 
-    fn check_positions(&self, positions: &[&[Point]]) -> Result<(), SceneError> {
-        let expected = self.bodies.len();
-        if positions.len() != expected {
-            return Err(SceneError::BodyCount { given: positions.len(), expected });
-        }
-        for (index, (body, given)) in self.bodies.iter().zip(positions).enumerate() {
-            let expected = body.positions.len();
-            if given.len() != expected {
-                return Err(SceneError::NodeCount { body: index, given: given.len(), expected });
+    fn check_positions<'a>(
+        &self,
+        positions: impl Fn(usize) -> &'a [Point],
+    ) -> Result<(), SceneError> {
+        for (index, body) in self.bodies.iter().enumerate() {
+            let (given, expected) = (positions(index).len(), body.positions.len());
+            if given != expected {
+                return Err(SceneError::NodeCount { body: index, given, expected });
             }
         }
-        for (body, given) in positions.iter().enumerate() {
+        for body in 0..self.bodies.len() {
+            let given = positions(body);
             let finite = |position: &Point| position.iter().all(|value| value.is_finite());
             if let Some(node) = given.iter().position(|position| !finite(position)) {
                 return Err(SceneError::NotFinite { body, node, position: given[node] });

@@ -4,7 +4,7 @@ use std::ops::AddAssign;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use palpate_contact::{Scene, SceneError, SceneOptions};
+use palpate_contact::{PenetratingNode, Scene, SceneError, SceneOptions};
 use palpate_geometry::Point;
 use palpate_mechanics::{Contact, Dynamics, DynamicsOptions, MechanicsError, State, StepStats};
 use palpate_model::Model;
@@ -110,6 +110,8 @@ pub struct Simulation {
     scene: Scene,
     dynamics: Dynamics,
     initial: State,
+    /// Copy of the last search: the scene's own list is gone when it searches for close pairs.
+    penetration: Vec<PenetratingNode>,
 }
 
 impl Simulation {
@@ -129,7 +131,7 @@ impl Simulation {
         let SimulationOptions { time_step, threads, .. } = options;
         let dynamics = Dynamics::new(&model, DynamicsOptions { time_step, threads })?;
         let initial = dynamics.state();
-        Ok(Self { model, options, scene, dynamics, initial })
+        Ok(Self { model, options, scene, dynamics, initial, penetration: Vec::new() })
     }
 
     /// Moves everything on by one time step.
@@ -139,7 +141,7 @@ impl Simulation {
     pub fn step(&mut self) -> Result<StepReport, SimulationError> {
         let start = Instant::now();
         let mut times = StepTimes::default();
-        update_scene(&mut self.scene, &self.dynamics)?;
+        self.scene()?;
         times.update = start.elapsed();
 
         let begin = Instant::now();
@@ -149,7 +151,8 @@ impl Simulation {
         let begin = Instant::now();
         let dynamics = &self.dynamics;
         let deformable_pair = |a: usize, b: usize| dynamics.search_distance(a, b).is_some();
-        let penetration = self.scene.penetration(&deformable_pair).nodes.clone();
+        let penetration = &mut self.penetration;
+        penetration.clone_from(&self.scene.penetration(&deformable_pair).nodes);
         times.penetration = begin.elapsed();
 
         let begin = Instant::now();
@@ -158,11 +161,11 @@ impl Simulation {
 
         let begin = Instant::now();
         let proximity_pairs = proximity.pairs.len();
-        let mechanics = self.dynamics.finish_step(&proximity.pairs, &penetration)?;
+        let mechanics = self.dynamics.finish_step(&proximity.pairs, penetration)?;
         times.mechanics += begin.elapsed();
         times.total = start.elapsed();
         Ok(StepReport {
-            step: self.dynamics.state().step,
+            step: self.dynamics.step_count(),
             time: self.dynamics.time(),
             times,
             proximity_pairs,
@@ -250,7 +253,7 @@ impl Simulation {
     /// # Errors
     /// If a position is not finite.
     pub fn scene(&mut self) -> Result<&mut Scene, SimulationError> {
-        update_scene(&mut self.scene, &self.dynamics)?;
+        self.scene.update_from(|body| self.dynamics.positions(body))?;
         Ok(&mut self.scene)
     }
 
@@ -296,11 +299,4 @@ impl Simulation {
         let count = self.model.bodies.len();
         if index < count { Ok(()) } else { Err(SimulationError::NoSuchBody { index, count }) }
     }
-}
-
-fn update_scene(scene: &mut Scene, dynamics: &Dynamics) -> Result<(), SceneError> {
-    let positions: Vec<&[Point]> =
-        (0..scene.body_count()).map(|body| dynamics.positions(body)).collect();
-    scene.update(&positions)?;
-    Ok(())
 }
