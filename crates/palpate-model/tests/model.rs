@@ -279,6 +279,15 @@ fn bodies_from_arrays_make_a_model_without_a_text() {
 }
 
 #[test]
+fn the_longest_chain_of_bodies_is_handled() {
+    let model = load(&format!("BRANCH{{ {} }}", "TREE{ NE a.seg }\n".repeat(10_000)));
+    assert_eq!(model.bodies.len(), 10_000);
+    assert_eq!(model.bodies[9_999].name, "a_10000");
+    let copy = model.clone();
+    assert_eq!(copy.structure, model.structure);
+}
+
+#[test]
 fn an_open_surface_is_a_body_too() {
     let data = MeshData {
         nodes: vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],

@@ -94,13 +94,13 @@ pub struct Branch {
 /// A TREE block.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Tree {
-    /// Name after TREE.
+    /// Name after TREE; without line ends.
     pub name: Option<String>,
     /// ME, MT, CN and VE.
     pub settings: Settings,
     /// PE.
     pub processor: Option<u32>,
-    /// NE: the mesh file as written, relative to the model file.
+    /// NE: the mesh file as written, relative to the model file; not empty, without line ends.
     pub file: String,
     /// FX, in the order of the text.
     pub fixed: Vec<Fixed>,

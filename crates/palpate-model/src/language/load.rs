@@ -93,6 +93,7 @@ impl Document {
             loader,
             meshes: HashMap::new(),
             names,
+            stems: HashMap::new(),
             bodies: Vec::new(),
             notes: Vec::new(),
             errors: Vec::new(),
@@ -158,6 +159,8 @@ struct Build<'a> {
     /// Meshes as in their files; `None` for those that could not be read.
     meshes: HashMap<PathBuf, Option<Arc<Mesh>>>,
     names: HashSet<String>,
+    /// How many names were made from each stem.
+    stems: HashMap<String, usize>,
     bodies: Vec<Body>,
     notes: Vec<String>,
     errors: Vec<Diagnostic>,
@@ -218,13 +221,14 @@ impl Build<'_> {
     /// The file's stem, with _2, _3 where another body has that name.
     fn unique_name(&mut self, path: &Path) -> String {
         let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        let mut name = stem.clone();
-        let mut number = 2;
-        while !self.names.insert(name.clone()) {
-            name = format!("{stem}_{number}");
-            number += 1;
+        let number = self.stems.entry(stem.clone()).or_insert(0);
+        loop {
+            *number += 1;
+            let name = if *number == 1 { stem.clone() } else { format!("{stem}_{number}") };
+            if self.names.insert(name.clone()) {
+                return name;
+            }
         }
-        name
     }
 
     fn mesh(&mut self, path: &Path, span: Span) -> Option<Arc<Mesh>> {
