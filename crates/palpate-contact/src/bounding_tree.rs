@@ -214,7 +214,7 @@ impl BoundingTree {
     }
 }
 
-/// Corner positions [m] of a triangle.
+/// Corner positions \[m\] of a triangle.
 #[inline]
 pub(crate) fn corner_points(positions: &[Point], corners: [u32; 3]) -> [Point; 3] {
     corners.map(|node| positions[node as usize])

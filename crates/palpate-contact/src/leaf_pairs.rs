@@ -17,7 +17,7 @@ const LEAVES_PER_TASK: usize = 256;
 pub(crate) struct BodyPair {
     pub(crate) a: u32,
     pub(crate) b: u32,
-    /// Elements closer than this [m] are wanted; zero where they must meet.
+    /// Elements closer than this \[m\] are wanted; zero where they must meet.
     pub(crate) distance: f64,
     /// `distance` widened by rounding: boxes further apart hold nothing wanted.
     pub(crate) margin: f64,
@@ -278,8 +278,14 @@ pub(crate) fn for_each<T: Send>(
     }
 }
 
-/// Whether two triangles have a node in common.
+/// Whether two triangles have a node in common; without branches, as [`meets`].
 #[inline]
 pub(crate) fn share_a_node(a: [u32; 3], b: [u32; 3]) -> bool {
-    a.iter().any(|node| b.contains(node))
+    let mut shared = false;
+    for node in a {
+        for other in b {
+            shared |= node == other;
+        }
+    }
+    shared
 }

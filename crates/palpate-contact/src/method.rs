@@ -39,7 +39,7 @@ impl Method {
     }
 }
 
-/// Distance [m] below which the elements of two bodies are a pair; `None` leaves the pair out.
+/// Distance \[m\] below which the elements of two bodies are a pair; `None` leaves the pair out.
 pub(crate) type DistanceOf<'a> = &'a (dyn Fn(usize, usize) -> Option<f64> + Sync);
 
 /// A method at work. It fills results that are handed over empty, and keeps its own buffers.

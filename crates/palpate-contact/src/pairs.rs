@@ -46,7 +46,7 @@ pub struct ProximityPair {
     pub weights: [f64; 4],
     /// Unit vector from side b to side a; where the distance is zero, a normal of the elements.
     pub normal: Point,
-    /// Distance [m], not negative.
+    /// Distance \[m\], not negative.
     pub distance: f64,
 }
 
@@ -65,6 +65,6 @@ pub struct PenetratingNode {
     pub weights: [f64; 3],
     /// Unit vector from the node to the exit point: the way out.
     pub direction: Point,
-    /// Distance to the exit point [m], positive.
+    /// Distance to the exit point \[m\], positive.
     pub depth: f64,
 }

@@ -101,7 +101,7 @@ pub(crate) fn direction(offset: Point, length: f64, size: f64) -> Option<Point> 
     if length > DIRECTION_THRESHOLD * size { unit(offset) } else { None }
 }
 
-/// Longest edge of a triangle [m].
+/// Longest edge of a triangle \[m\].
 pub(crate) fn size([a, b, c]: &[Point; 3]) -> f64 {
     let longest = vec3::distance_squared(*a, *b)
         .max(vec3::distance_squared(*b, *c))

@@ -209,7 +209,7 @@ impl Scene {
         &self.bodies[body].mesh
     }
 
-    /// A body's node positions [m] of the last update, shape (n, 3).
+    /// A body's node positions \[m\] of the last update, shape (n, 3).
     pub fn positions(&self, body: usize) -> &[Point] {
         &self.bodies[body].positions
     }
@@ -226,7 +226,7 @@ impl Scene {
 
     /// Moves the bodies: refits each bounding tree bottom-up, then the upper tree.
     ///
-    /// `positions` [m]: for each body one entry per node.
+    /// `positions` \[m\]: for each body one entry per node.
     ///
     /// # Errors
     /// If counts do not fit or a number is not finite; the scene is then unchanged.
@@ -304,7 +304,7 @@ impl Scene {
         &self.penetration
     }
 
-    /// The point of a body's surface closest to `point` [m], if one is at most `within` [m] away.
+    /// The point of a body's surface closest to `point` \[m\], if one is at most `within` \[m\] away.
     ///
     /// # Panics
     /// If there is no such body.

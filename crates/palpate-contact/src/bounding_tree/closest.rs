@@ -16,15 +16,15 @@ struct Search<'a> {
     tree: &'a BoundingTree,
     positions: &'a [Point],
     point: Point,
-    /// Absolute rounding error of a distance here [m].
+    /// Absolute rounding error of a distance here \[m\].
     rounding: f64,
     best: SurfacePoint,
-    /// No box further than this can hold a better point [m²].
+    /// No box further than this can hold a better point \[m²\].
     limit_squared: f64,
 }
 
 impl BoundingTree {
-    /// The surface point closest to `point`, if one is at most `within` [m] away.
+    /// The surface point closest to `point`, if one is at most `within` \[m\] away.
     ///
     /// Of triangles at equal distance the one with the smallest index.
     pub(crate) fn closest_point(
@@ -50,7 +50,7 @@ impl BoundingTree {
     }
 }
 
-/// Bound on the rounding error [m] of coordinate differences near the tree and `point`.
+/// Bound on the rounding error \[m\] of coordinate differences near the tree and `point`.
 fn rounding_at(tree: &BoundingTree, point: &Point) -> f64 {
     let bounds = tree.bounds();
     let coordinates = bounds.min.iter().chain(&bounds.max).chain(point);

@@ -7,7 +7,7 @@ use super::{BoundingTree, corner_points};
 impl BoundingTree {
     /// Recomputes every box from the current node positions, keeping the tree's shape.
     ///
-    /// `positions` [m], one entry per mesh node. Only surface nodes are read: inner nodes can touch
+    /// `positions` \[m\], one entry per mesh node. Only surface nodes are read: inner nodes can touch
     /// nothing (paper, "Update"). O(P) for P tree nodes, no allocation.
     ///
     /// # Panics

@@ -23,7 +23,7 @@ const END: u32 = u32::MAX;
 /// Hash table of cells and its buffers.
 #[derive(Debug, Default)]
 pub(super) struct Hash {
-    /// Mean edge length of all surfaces [m]: the cell size that the paper recommends.
+    /// Mean edge length of all surfaces \[m\]: the cell size that the paper recommends.
     mean_edge: f64,
     /// Raised each step: a bucket with an older stamp is empty, so that nothing has to be cleared.
     stamp: u32,

@@ -87,9 +87,9 @@ pub struct ClosestPoint {
     pub triangle: u32,
     /// Barycentric weights of the closest point on it.
     pub weights: [f64; 3],
-    /// The closest point [m].
+    /// The closest point \[m\].
     pub position: Point,
-    /// Distance [m].
+    /// Distance \[m\].
     pub distance: f64,
     /// Whether the given point is strictly inside the body; never for an open surface.
     pub inside: bool,
