@@ -76,11 +76,11 @@ pub struct StepStats {
 /// ```
 /// use palpate_mechanics::{Dynamics, DynamicsOptions};
 /// # use std::sync::Arc;
-/// # use palpate_model::{Body, Mesh, MeshData, Model, Structure::Body as Leaf};
+/// # use palpate_model::{Body, Mesh, MeshData, Model};
 /// # let nodes = vec![[0.0; 3], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 0.1]];
 /// # let data = MeshData { nodes, tetrahedra: vec![[0, 1, 2, 3]], ..MeshData::default() };
 /// # let body = Body::new("falling", Arc::new(Mesh::new(data)?));
-/// # let model = Model { bodies: vec![body], structure: Leaf(0), gravity: [0.0, 0.0, -9.81] };
+/// # let model = Model::from_bodies(vec![body]);
 /// let mut dynamics = Dynamics::new(&model, DynamicsOptions::default())?;
 /// dynamics.begin_step();
 /// let (proximity, penetration) = (Vec::new(), Vec::new()); // from contact detection

@@ -50,9 +50,9 @@ impl PyScene {
         Ok(Self { scene: Mutex::new((scene, Duration::ZERO)) })
     }
 
-    fn add(&self, py: Python<'_>, mesh: &PyMesh) -> PyResult<usize> {
+    fn add(&self, py: Python<'_>, mesh: &PyMesh) -> usize {
         let mesh = mesh.mesh.clone();
-        raise(py, py.detach(|| self.lock().0.add(mesh)))
+        py.detach(|| self.lock().0.add(mesh))
     }
 
     fn remove(&self, py: Python<'_>, body: usize) -> PyResult<()> {
