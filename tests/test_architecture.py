@@ -22,6 +22,10 @@ ALLOWED = {
 }
 
 
+#: METIS is called through its C interface; SIMD intrinsics stand in one file.
+UNSAFE = {"metis.rs", "simd.rs"}
+
+
 def test_crates_depend_one_way():
     for crate, allowed in ALLOWED.items():
         manifest = (ROOT / "crates" / crate / "Cargo.toml").read_text()
@@ -37,4 +41,4 @@ def test_every_crate_is_listed():
 def test_unsafe_stays_out():
     for source in (ROOT / "crates").glob("*/src/**/*.rs"):
         code = re.sub(r"//.*", "", source.read_text())
-        assert not re.search(r"\bunsafe\b", code) or source.name == "simd.rs", source
+        assert not re.search(r"\bunsafe\b", code) or source.name in UNSAFE, source

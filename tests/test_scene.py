@@ -103,7 +103,7 @@ BAD_POSITIONS = [
     (None, TypeError, "positions: expected a sequence"),
     (7, TypeError, "positions: expected a sequence"),
     ([GOOD, np.full((8, 3), np.nan)], ValueError, "finite"),
-    ([GOOD, np.full((8, 3), np.inf)], ValueError, "node 0"),
+    ([GOOD, np.full((8, 3), np.inf)], ValueError, r"positions\[1\]\[0\]"),
 ]
 
 

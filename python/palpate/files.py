@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import tempfile
+import warnings
 from collections import Counter
 from pathlib import Path
 from typing import Any
@@ -81,7 +82,9 @@ def _read_with_meshio(path: Path, repair: bool) -> Mesh:
         raise FileNotFoundError(2, "No such file", str(path))
     meshio = _meshio(path)
     try:
-        raw = meshio.read(path)
+        with warnings.catch_warnings():  # numpy's, about meshio's own arithmetic
+            warnings.simplefilter("ignore")
+            raw = meshio.read(path)
     except SystemExit:  # meshio ends the process on some unknown formats
         raise MeshError(f"{path}: not a mesh that meshio can read", str(path)) from None
     except Exception as error:
@@ -202,7 +205,9 @@ def _write_with_meshio(path: Path, mesh: Mesh) -> None:
     # (TetGen) are several files, which all move.
     with tempfile.TemporaryDirectory(dir=path.parent, prefix=".palpate-") as folder:
         try:
-            meshio.write(Path(folder) / path.name, raw)
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                meshio.write(Path(folder) / path.name, raw)
         except SystemExit:
             raise MeshError(f"{path}: meshio cannot write this format", str(path)) from None
         except Exception as error:

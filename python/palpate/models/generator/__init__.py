@@ -1,0 +1,1 @@
+"""Makes the example organs: implicit shapes, node placement, tetrahedra, improvement, checks."""
