@@ -33,8 +33,10 @@ pub mod pairs;
 mod penetration;
 mod proximity;
 pub mod scene;
+mod simd;
 mod surface;
 mod upper_tree;
+mod wide;
 
 pub use bounding_tree::{BoundingTree, Split, TreeDefect, TreeStats};
 pub use pairs::{PairKind, PenetratingNode, ProximityPair, TrianglePair};

@@ -4,6 +4,7 @@
 mod all_pairs;
 mod hash;
 mod paper;
+mod wide;
 
 use std::fmt::Debug;
 
@@ -24,17 +25,20 @@ pub enum Method {
     AllPairs,
     /// Spatial hashing after Teschner et al. 2003; proximity goes through the bounding trees.
     Hash,
+    /// The wide layout: triangles in blocks of eight, level by level.
+    Wide,
 }
 
 impl Method {
     /// All methods.
-    pub const ALL: [Self; 3] = [Self::Paper, Self::AllPairs, Self::Hash];
+    pub const ALL: [Self; 4] = [Self::Paper, Self::AllPairs, Self::Hash, Self::Wide];
 
     pub(crate) fn detector(self) -> Box<dyn Detector> {
         match self {
             Self::Paper => Box::new(paper::Paper::default()),
             Self::AllPairs => Box::new(all_pairs::AllPairs),
             Self::Hash => Box::new(hash::Hash::default()),
+            Self::Wide => Box::new(wide::Wide::default()),
         }
     }
 }
@@ -46,6 +50,9 @@ pub(crate) type DistanceOf<'a> = &'a (dyn Fn(usize, usize) -> Option<f64> + Sync
 pub(crate) trait Detector: Debug + Send + Sync {
     /// Bodies were added, removed or replaced.
     fn bodies_changed(&mut self, _bodies: &[SceneBody]) {}
+
+    /// The bodies are at other positions, their trees refitted. Also called after `bodies_changed`.
+    fn bodies_moved(&mut self, _frame: &Frame) {}
 
     fn intersections(
         &mut self,

@@ -259,6 +259,8 @@ impl Scene {
             self.bodies.iter_mut().enumerate().for_each(move_body);
         }
         self.upper.refit(|body| self.bodies[body].tree.bounds());
+        let frame = Frame { bodies: &self.bodies, upper: &self.upper, pool: self.pool.as_ref() };
+        self.detector.bodies_moved(&frame);
         let nodes_refitted = self.bodies.iter().map(|body| body.tree.nodes().len() as u64).sum();
         Ok(UpdateStats { time: start.elapsed(), nodes_refitted })
     }
@@ -325,6 +327,8 @@ impl Scene {
     fn bodies_changed(&mut self) {
         self.upper.refit(|body| self.bodies[body].tree.bounds());
         self.detector.bodies_changed(&self.bodies);
+        let frame = Frame { bodies: &self.bodies, upper: &self.upper, pool: self.pool.as_ref() };
+        self.detector.bodies_moved(&frame);
     }
 
     fn check_body(&self, body: usize) -> Result<(), SceneError> {

@@ -66,6 +66,7 @@ fn all_options() -> Vec<SceneOptions> {
         }
     }
     all.push(SceneOptions { method: Method::Hash, ..SceneOptions::default() });
+    all.push(SceneOptions { method: Method::Wide, ..SceneOptions::default() });
     all.push(SceneOptions { method: Method::AllPairs, ..SceneOptions::default() });
     all
 }

@@ -68,6 +68,7 @@ fn check(case: &Case, distances: &[f64]) -> usize {
     let mut slow = of(Method::AllPairs, 2);
     let mut fast: Vec<Scene> = [1, 2, 5, 50].map(|leaf_size| of(Method::Paper, leaf_size)).into();
     fast.push(of(Method::Hash, 2));
+    fast.push(of(Method::Wide, 2));
     for frame in &case.frames {
         for &cells in distances {
             let limit = cells * cell(frame);

@@ -1,0 +1,182 @@
+//! Simultaneous traversal, level by level, on lists of block pairs.
+
+use super::adjacency::{UPPER, bits};
+use super::boxes::{Block, at_least_lowest, at_most_largest, rounding};
+use super::separation::round_up;
+use super::{WIDTH, WideBody};
+use crate::leaf_pairs::Cost;
+use crate::simd::{Isa, Kernel, Lanes};
+
+/// Buffers of a traversal.
+#[derive(Debug, Default)]
+pub(crate) struct Traversal {
+    /// Block pairs of the level that is next: as output, of the level where it stopped.
+    pub(crate) pairs: Vec<[u32; 2]>,
+    next: Vec<[u32; 2]>,
+    masks: Vec<u64>,
+}
+
+/// What a traversal compares.
+#[derive(Clone, Copy)]
+pub(crate) struct Sides<'a> {
+    pub(crate) isa: Isa,
+    pub(crate) a: &'a WideBody,
+    pub(crate) b: &'a WideBody,
+    pub(crate) is_self: bool,
+    /// Boxes further apart than this [m] are not wanted.
+    pub(crate) margin: f64,
+}
+
+impl Sides<'_> {
+    /// The level of the single first block pair: the deeper body's last. Zero for one block against
+    /// itself, which has no traversal.
+    pub(crate) fn top(&self) -> usize {
+        self.a.depth().max(self.b.depth()).saturating_sub(1)
+    }
+}
+
+impl Traversal {
+    /// Goes down one level, from `level`, which is not 0.
+    pub(crate) fn descend(&mut self, sides: &Sides, level: usize, cost: &mut Cost) {
+        self.test(sides, level, cost);
+        self.next.clear();
+        for (&[a, b], &mask) in self.pairs.iter().zip(&self.masks) {
+            let mut mask = mask;
+            if sides.is_self {
+                if a == b {
+                    mask &= UPPER;
+                    if level > 1 {
+                        let count = sides.a.level(level - 1).len() as u32;
+                        let first = a * WIDTH as u32;
+                        let children = first..(first + WIDTH as u32).min(count);
+                        self.next.extend(children.map(|child| [child, child]));
+                    }
+                }
+                if level == 1 {
+                    mask &= !sides.a.adjacency.child_pairs([a, b]);
+                }
+            }
+            push_lanes([a, b], mask, &mut self.next);
+        }
+        std::mem::swap(&mut self.pairs, &mut self.next);
+    }
+
+    /// Collects the slot pairs whose boxes meet, of the block pairs of level 0.
+    pub(crate) fn collect(
+        &mut self,
+        sides: &Sides,
+        candidates: &mut Vec<[u32; 2]>,
+        cost: &mut Cost,
+    ) {
+        self.test(sides, 0, cost);
+        cost.leaf_pairs += self.pairs.len() as u64;
+        for (&pair, &mask) in self.pairs.iter().zip(&self.masks) {
+            push_lanes(pair, mask, candidates);
+        }
+    }
+
+    /// Collects the slot pairs of neighbouring blocks of one body whose boxes meet and that share no
+    /// node. `range`: of the pairs of its adjacency.
+    pub(crate) fn collect_adjacent(
+        &mut self,
+        sides: &Sides,
+        range: std::ops::Range<usize>,
+        candidates: &mut Vec<[u32; 2]>,
+        cost: &mut Cost,
+    ) {
+        let adjacency = &sides.a.adjacency;
+        let pairs = &adjacency.pairs[range.clone()];
+        self.masks.clear();
+        let (blocks, margin) = (sides.a.level(0), sides.margin);
+        sides.isa.run(Overlap { a: blocks, b: blocks, pairs, margin, masks: &mut self.masks });
+        cost.count(pairs.len());
+        cost.leaf_pairs += pairs.len() as u64;
+        for ((&pair, &mask), &apart) in pairs.iter().zip(&self.masks).zip(&adjacency.apart[range]) {
+            push_lanes(pair, mask & apart, candidates);
+        }
+    }
+
+    fn test(&mut self, sides: &Sides, level: usize, cost: &mut Cost) {
+        let (a, b) = (sides.a.level(level), sides.b.level(level));
+        self.masks.clear();
+        let (pairs, margin, masks) = (&self.pairs, sides.margin, &mut self.masks);
+        sides.isa.run(Overlap { a, b, pairs, margin, masks });
+        cost.count(pairs.len());
+    }
+}
+
+impl Cost {
+    fn count(&mut self, block_pairs: usize) {
+        self.nodes_visited += block_pairs as u64;
+        self.box_tests += (block_pairs * WIDTH * WIDTH) as u64;
+    }
+}
+
+#[inline]
+fn push_lanes([a, b]: [u32; 2], mask: u64, found: &mut Vec<[u32; 2]>) {
+    let (a, b) = (a * WIDTH as u32, b * WIDTH as u32);
+    for bit in bits(mask) {
+        found.push([a + (bit / WIDTH) as u32, b + (bit % WIDTH) as u32]);
+    }
+}
+
+/// Which boxes of two blocks meet: bit 8 i + j for lane i of a and lane j of b.
+struct Overlap<'a> {
+    a: &'a [Block],
+    b: &'a [Block],
+    pairs: &'a [[u32; 2]],
+    margin: f64,
+    masks: &'a mut Vec<u64>,
+}
+
+impl Kernel for Overlap<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        let Self { a, b, pairs, margin, masks } = self;
+        // Plain loops: what an iterator's adaptor does not inline is not compiled for the lanes.
+        masks.resize(pairs.len(), 0);
+        if margin > 0.0 {
+            let margin = L::splat(round_up(margin));
+            for (mask, &[i, j]) in masks.iter_mut().zip(pairs) {
+                *mask = overlaps::<L>(&widened(&a[i as usize], margin), &b[j as usize]);
+            }
+        } else {
+            for (mask, &[i, j]) in masks.iter_mut().zip(pairs) {
+                *mask = overlaps::<L>(&a[i as usize], &b[j as usize]);
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn overlaps<L: Lanes>(a: &Block, b: &Block) -> u64 {
+    let b_min = [L::load(&b.min[0]), L::load(&b.min[1]), L::load(&b.min[2])];
+    let b_max = [L::load(&b.max[0]), L::load(&b.max[1]), L::load(&b.max[2])];
+    let mut mask = 0;
+    for i in 0..WIDTH {
+        let mut meet = L::splat(a.min[0][i]).le(b_max[0]);
+        meet = meet.and(b_min[0].le(L::splat(a.max[0][i])));
+        for axis in 1..3 {
+            meet = meet.and(L::splat(a.min[axis][i]).le(b_max[axis]));
+            meet = meet.and(b_min[axis].le(L::splat(a.max[axis][i])));
+        }
+        mask |= u64::from(meet.bits()) << (WIDTH * i);
+    }
+    mask
+}
+
+/// Boxes grown by `margin` and rounded outwards. Empty boxes stay empty, or become NaN, which meets
+/// nothing either.
+#[inline(always)]
+fn widened<L: Lanes>(block: &Block, margin: L) -> Block {
+    let mut wide = Block::EMPTY;
+    for axis in 0..3 {
+        let min = L::load(&block.min[axis]).sub(margin);
+        let max = L::load(&block.max[axis]).add(margin);
+        at_least_lowest(min.sub(rounding(min))).store(&mut wide.min[axis]);
+        at_most_largest(max.add(rounding(max))).store(&mut wide.max[axis]);
+    }
+    wide
+}
