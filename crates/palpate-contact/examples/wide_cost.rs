@@ -76,8 +76,9 @@ struct Parry {
 impl Parry {
     fn new(meshes: &[Arc<Mesh>]) -> Self {
         let tree = |mesh: &Arc<Mesh>| {
-            let boxes: Vec<ParryAabb> =
-                (0..mesh.triangles().len()).map(|t| parry_box(mesh, mesh.nodes(), t, 0.0)).collect();
+            let boxes: Vec<ParryAabb> = (0..mesh.triangles().len())
+                .map(|t| parry_box(mesh, mesh.nodes(), t, 0.0))
+                .collect();
             Bvh::from_leaves(BvhBuildStrategy::Binned, &boxes)
         };
         Self { trees: meshes.iter().map(tree).collect(), workspace: BvhWorkspace::default() }
@@ -139,7 +140,11 @@ fn main() -> Result<(), Failure> {
         let edge = mean_edge(&meshes);
         let rest = positions(&meshes);
         let diagonal = vec3::norm(Aabb::from_points(rest.iter().flatten()).extent());
-        writeln!(out, "\n{set}: {triangles} surface triangles, 1e-3 diagonal {:.3} edges", 1e-3 * diagonal / edge)?;
+        writeln!(
+            out,
+            "\n{set}: {triangles} surface triangles, 1e-3 diagonal {:.3} edges",
+            1e-3 * diagonal / edge
+        )?;
         for height in [0.0, 1.0, 4.0] {
             let frames = frames(&rest, edge, height);
             writeln!(out, " waves of {height} edges")?;
@@ -195,7 +200,11 @@ fn measure(
     Ok(())
 }
 
-fn measure_parry(out: &mut impl Write, meshes: &[Arc<Mesh>], frames: &[Positions]) -> Result<(), Failure> {
+fn measure_parry(
+    out: &mut impl Write,
+    meshes: &[Arc<Mesh>],
+    frames: &[Positions],
+) -> Result<(), Failure> {
     let mut parry = Parry::new(meshes);
     let mut candidates = Vec::new();
     let mut times: [Vec<Duration>; 3] = std::array::from_fn(|_| Vec::new());

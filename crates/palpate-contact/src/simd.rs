@@ -403,3 +403,80 @@ impl Lanes for Avx2 {
         fold_each!(rows, max)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const VALUES: [f32; 12] = [
+        0.0,
+        -0.0,
+        1.0,
+        -1.5,
+        f32::MAX,
+        f32::MIN_POSITIVE,
+        1e-45,
+        -3e-39,
+        f32::INFINITY,
+        f32::NEG_INFINITY,
+        f32::NAN,
+        0.1,
+    ];
+
+    /// All results on some lanes; NaN of any kind counts as one.
+    struct All([[f32; 8]; 3]);
+
+    impl Kernel for All {
+        type Output = Vec<u32>;
+
+        #[inline(always)]
+        fn run<L: Lanes>(self) -> Vec<u32> {
+            let [a, b, c] = [L::load(&self.0[0]), L::load(&self.0[1]), L::load(&self.0[2])];
+            let numbers = [a.add(b), a.sub(b), a.mul(b), a.div(b), a.sqrt(), a.min(b), a.max(b)];
+            let more = [
+                a.abs(),
+                a.blend(b, b.le(c)),
+                L::splat(self.0[0][3]),
+                L::min_of_each([a, b, c, a.add(b), b.min(a), c.sub(a), b, b.abs()]),
+                L::max_of_each([a, b, c, a.add(b), b.min(a), c.sub(a), b, b.abs()]),
+            ];
+            let mut bits = vec![a.le(b).bits(), a.gt(b).bits(), a.bits()];
+            bits.push(a.le(b).and(b.le(c)).bits());
+            bits.push(a.le(b).or(b.le(c)).bits());
+            let mut stored = [0.0; 8];
+            for lanes in numbers.into_iter().chain(more) {
+                lanes.store(&mut stored);
+                bits.extend(stored.map(|v| if v.is_nan() { u32::MAX } else { v.to_bits() }));
+            }
+            let nodes = self.0.map(|[x, y, z, w, ..]| [x, y, z, w]);
+            let [p, q, r] = [&nodes[0], &nodes[1], &nodes[2]];
+            for lanes in L::gather([p, q, r, q, p, r, r, q]) {
+                lanes.store(&mut stored);
+                bits.extend(stored.map(f32::to_bits));
+            }
+            bits
+        }
+    }
+
+    #[test]
+    fn both_paths_give_the_same_bits() {
+        let fast = Isa::detect();
+        let mut state = 1_usize;
+        for _ in 0..20_000 {
+            let mut value = || {
+                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(99);
+                VALUES[(state >> 33) % VALUES.len()]
+            };
+            let lanes: [[f32; 8]; 3] = std::array::from_fn(|_| std::array::from_fn(|_| value()));
+            assert_eq!(fast.run(All(lanes)), Isa::Scalar.run(All(lanes)), "{lanes:?}");
+        }
+    }
+
+    #[test]
+    fn this_machine_says_what_it_has() {
+        #[cfg(target_arch = "x86_64")]
+        assert_eq!(Isa::detect() != Isa::Scalar, std::arch::is_x86_feature_detected!("avx2"));
+        #[cfg(not(target_arch = "x86_64"))]
+        assert_eq!(Isa::detect(), Isa::Scalar);
+    }
+}

@@ -10,6 +10,8 @@ mod boxes;
 mod features;
 mod order;
 mod separation;
+#[cfg(test)]
+mod tests;
 mod traverse;
 
 use std::sync::Arc;
@@ -90,10 +92,6 @@ impl WideBody {
 
     pub(crate) fn adjacency(&self) -> &Adjacency {
         &self.adjacency
-    }
-
-    pub(crate) fn nodes(&self) -> &[[f32; 4]] {
-        &self.nodes
     }
 
     /// The mesh's node of an index into `nodes`.

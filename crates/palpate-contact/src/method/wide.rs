@@ -172,7 +172,8 @@ impl Detector for Wide {
         let first = frame.bodies.first().and_then(|body| body.positions.first());
         let origin: Point = first.copied().unwrap_or_default();
         let isa = self.isa;
-        let refit = |body: &mut WideBody, moved: &SceneBody| body.refit(isa, &moved.positions, origin);
+        let refit =
+            |body: &mut WideBody, moved: &SceneBody| body.refit(isa, &moved.positions, origin);
         if let Some(pool) = frame.pool {
             use rayon::prelude::*;
             let bodies = self.bodies.par_iter_mut().zip(frame.bodies);

@@ -119,11 +119,7 @@ pub(super) fn corners<L: Lanes>(nodes: &[[f32; 4]], slots: &[[u32; 4]; WIDTH]) -
 }
 
 #[inline(always)]
-fn gather<L: Lanes>(
-    nodes: &[[f32; 4]],
-    slots: &[[u32; 4]; WIDTH],
-    corner: usize,
-) -> [L; 3] {
+fn gather<L: Lanes>(nodes: &[[f32; 4]], slots: &[[u32; 4]; WIDTH], corner: usize) -> [L; 3] {
     let [a, b, c, d, e, f, g, h] = slots;
     L::gather([
         &nodes[a[corner] as usize],

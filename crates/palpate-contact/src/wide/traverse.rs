@@ -121,12 +121,12 @@ fn push_lanes([a, b]: [u32; 2], mask: u64, found: &mut Vec<[u32; 2]>) {
 }
 
 /// Which boxes of two blocks meet: bit 8 i + j for lane i of a and lane j of b.
-struct Overlap<'a> {
-    a: &'a [Block],
-    b: &'a [Block],
-    pairs: &'a [[u32; 2]],
-    margin: f64,
-    masks: &'a mut Vec<u64>,
+pub(super) struct Overlap<'a> {
+    pub(super) a: &'a [Block],
+    pub(super) b: &'a [Block],
+    pub(super) pairs: &'a [[u32; 2]],
+    pub(super) margin: f64,
+    pub(super) masks: &'a mut Vec<u64>,
 }
 
 impl Kernel for Overlap<'_> {

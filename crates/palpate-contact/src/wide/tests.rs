@@ -1,0 +1,221 @@
+//! Boxes hold what they stand for; both paths of every kernel give the same bits.
+
+use std::sync::Arc;
+
+use palpate_geometry::Point;
+use palpate_model::mesh::NONE;
+use palpate_model::{Mesh, MeshData};
+
+use super::boxes::Block;
+use super::traverse::Overlap;
+use super::{EdgePairs, Reach, SeparateTriangles, VertexPairs, WideBody, bits};
+use crate::simd::Isa;
+
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_mul(0x5851_f42d_4c95_7f2d).wrapping_add(0x1405_7b7e_f767_814f);
+        let mixed = self.0 ^ self.0 >> 29;
+        mixed.wrapping_mul(0xbf58_476d_1ce4_e5b9) >> 7
+    }
+
+    fn below(&mut self, end: usize) -> usize {
+        self.next() as usize % end
+    }
+
+    fn unit(&mut self) -> f64 {
+        (self.next() >> 4) as f64 / (1_u64 << 53) as f64 - 0.5
+    }
+
+    /// Numbers that round badly: neighbours of `f32` values and of the ends of its range.
+    fn awkward(&mut self) -> f64 {
+        const EDGES: [f64; 8] = [
+            0.0,
+            1.0,
+            f32::MAX as f64,
+            f32::MIN_POSITIVE as f64,
+            1e-45,
+            1e300,
+            f64::MIN_POSITIVE,
+            16_777_216.0,
+        ];
+        let value = match self.below(4) {
+            0 => EDGES[self.below(EDGES.len())],
+            1 => f64::from(self.unit() as f32),
+            2 => 10_f64.powi(self.below(80) as i32 - 40) * self.unit(),
+            _ => self.unit(),
+        };
+        let value = if self.below(2) == 0 { value } else { -value };
+        match self.below(3) {
+            0 => value.next_up(),
+            1 => value.next_down(),
+            _ => value,
+        }
+    }
+}
+
+/// A tangle of `count` triangles over few nodes.
+fn tangle(count: usize, random: &mut Random) -> Arc<Mesh> {
+    let node_count = 3 + count;
+    let nodes = (0..node_count).map(|_| std::array::from_fn(|_| random.unit())).collect();
+    let mut triangles: Vec<[u32; 3]> = Vec::new();
+    while triangles.len() < count {
+        let first = random.below(node_count - 2);
+        let mut corners = [first, first + 1, first + 2].map(|node| node as u32);
+        corners[2] = random.below(node_count) as u32;
+        let new = triangles.iter().all(|other| !corners.iter().all(|node| other.contains(node)));
+        if new && corners[2] != corners[0] && corners[2] != corners[1] {
+            triangles.push(corners);
+        }
+    }
+    Arc::new(Mesh::new(MeshData { nodes, triangles, ..MeshData::default() }).expect("a tangle"))
+}
+
+fn bits_of(blocks: &[Block]) -> Vec<u32> {
+    blocks.iter().flat_map(|b| b.min.iter().chain(&b.max).flatten().map(|v| v.to_bits())).collect()
+}
+
+fn positions(mesh: &Mesh, round: usize, random: &mut Random) -> Vec<Point> {
+    let awkward = |random: &mut Random| std::array::from_fn(|_| random.awkward());
+    match round % 3 {
+        0 => mesh.nodes().to_vec(),
+        1 => mesh.nodes().iter().map(|_| awkward(random)).collect(),
+        _ => {
+            let offset: Point = std::array::from_fn(|_| 1e8 * random.unit());
+            mesh.nodes().iter().map(|p| std::array::from_fn(|i| p[i] + offset[i])).collect()
+        }
+    }
+}
+
+#[test]
+fn boxes_hold_their_triangles_and_children_at_any_scale() {
+    let mut random = Random(11);
+    for round in 0..300 {
+        let mesh = tangle(1 + random.below(200), &mut random);
+        let mut body = WideBody::pack(&mesh);
+        let positions = positions(&mesh, round, &mut random);
+        let origin = if round % 2 == 0 { [0.0; 3] } else { positions[0] };
+        body.refit(Isa::detect(), &positions, origin);
+        let mut seen = vec![0; mesh.triangles().len()];
+        for (slot, &[.., triangle]) in body.slots.iter().enumerate() {
+            let (block, lane) = (&body.level(0)[slot / 8], slot % 8);
+            if triangle == NONE {
+                assert!((0..3).all(|axis| block.min[axis][lane] > block.max[axis][lane]));
+                continue;
+            }
+            seen[triangle as usize] += 1;
+            for node in mesh.triangles()[triangle as usize] {
+                for axis in 0..3 {
+                    // What is beyond f32 counts as its end.
+                    let value = positions[node as usize][axis] - origin[axis];
+                    let value = value.clamp(-f64::from(f32::MAX), f64::from(f32::MAX));
+                    assert!(f64::from(block.min[axis][lane]) <= value);
+                    assert!(f64::from(block.max[axis][lane]) >= value);
+                }
+            }
+        }
+        assert!(seen.iter().all(|&count| count == 1));
+        for level in 0..body.depth() {
+            for (index, block) in body.level(level).iter().enumerate() {
+                let parent = &body.level(level + 1)[index / 8];
+                for axis in 0..3 {
+                    for lane in 0..8 {
+                        assert!(parent.min[axis][index % 8] <= block.min[axis][lane]);
+                        assert!(parent.max[axis][index % 8] >= block.max[axis][lane]);
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn adjacency_is_what_the_corners_say() {
+    let mut random = Random(5);
+    for count in [1, 7, 8, 9, 64, 65, 300] {
+        let body = WideBody::pack(&tangle(count, &mut random));
+        let corners = |slot: u32| &body.slots[slot as usize][..3];
+        let (mut sharing, mut apart) = (Vec::new(), Vec::new());
+        for (index, &[a, b]) in body.adjacency.pairs.iter().enumerate() {
+            assert_eq!(body.adjacency.child_pairs([a / 8, b / 8]) >> (8 * (a % 8) + b % 8) & 1, 1);
+            for (mask, list) in [
+                (body.adjacency.sharing[index], &mut sharing),
+                (body.adjacency.apart[index], &mut apart),
+            ] {
+                list.extend(bits(mask).map(|bit| [8 * a + bit as u32 / 8, 8 * b + bit as u32 % 8]));
+            }
+        }
+        let is_adjacent = |i: u32, j: u32| body.adjacency.pairs.contains(&[i / 8, j / 8]);
+        for i in 0..count as u32 {
+            for j in i + 1..count as u32 {
+                let share = corners(i).iter().any(|node| corners(j).contains(node));
+                let occurs = |list: &[[u32; 2]]| {
+                    list.iter().filter(|&&pair| pair == [i, j] || pair == [j, i]).count()
+                };
+                assert_eq!(occurs(&sharing), usize::from(share));
+                assert_eq!(occurs(&apart), usize::from(!share && is_adjacent(i, j)));
+            }
+        }
+        assert!(sharing.iter().chain(&apart).flatten().all(|&slot| (slot as usize) < count));
+    }
+}
+
+#[test]
+fn every_kernel_gives_the_same_bits_on_both_paths() {
+    let fast = Isa::detect();
+    let mut random = Random(3);
+    for round in 0..60 {
+        let meshes = [90, 37].map(|count| tangle(count, &mut random));
+        let moved = [0, 1].map(|i| positions(&meshes[i], round, &mut random));
+        let packed = |isa: Isa| -> [WideBody; 2] {
+            [0, 1].map(|i| {
+                let mut body = WideBody::pack(&meshes[i]);
+                body.refit(isa, &moved[i], moved[0][0]);
+                body
+            })
+        };
+        let ([a, b], [slow_a, slow_b]) = (packed(fast), packed(Isa::Scalar));
+        for (body, slow) in [(&a, &slow_a), (&b, &slow_b)] {
+            for level in 0..=body.depth() {
+                assert_eq!(bits_of(body.level(level)), bits_of(slow.level(level)));
+            }
+        }
+        for margin in [0.0, 1e-3, 0.2, 1e300] {
+            let blocks = |body: &WideBody| body.level(0).len() as u32;
+            let pairs: Vec<[u32; 2]> =
+                (0..blocks(&a)).flat_map(|i| (0..blocks(&b)).map(move |j| [i, j])).collect();
+            let masks = |isa: Isa| {
+                let mut masks = Vec::new();
+                let (a, b) = (a.level(0), b.level(0));
+                isa.run(Overlap { a, b, pairs: &pairs, margin, masks: &mut masks });
+                masks
+            };
+            assert_eq!(masks(fast), masks(Isa::Scalar));
+            let reach = Reach::new(&a, &b, margin);
+            let mut candidate = |ends: [usize; 2]| ends.map(|end| random.below(end) as u32);
+            let triangles: Vec<_> = (0..99).map(|_| candidate([90, 37])).collect();
+            let nodes: Vec<_> = (0..99).map(|_| candidate([a.nodes.len(), 37])).collect();
+            let edges: Vec<_> = (0..99)
+                .map(|_| candidate([90, 37]))
+                .map(|[i, j]| [4 * i + (i ^ j) % 3, 4 * j + (i + j) % 3])
+                .collect();
+            let kept = |isa: Isa| {
+                let (a, b) = (&a, &b);
+                let mut lists: [Vec<[u32; 2]>; 3] = Default::default();
+                let [kept, near_nodes, near_edges] = &mut lists;
+                isa.run(SeparateTriangles { a, b, reach, candidates: &triangles, kept });
+                let kept = near_nodes;
+                isa.run(VertexPairs { from: a, to: b, reach, candidates: &nodes, kept });
+                let kept = near_edges;
+                isa.run(EdgePairs { a, b, reach, candidates: &edges, kept });
+                lists
+            };
+            let lists = kept(fast);
+            assert_eq!(lists, kept(Isa::Scalar));
+            if round % 3 == 0 {
+                assert!(lists.iter().all(|list| (margin < 1.0) == (list.len() < 99)), "{margin}");
+            }
+        }
+    }
+}

@@ -1,0 +1,145 @@
+//! The wide layout against the double loop on very many very small scenes, awkward ones first of all.
+
+#[path = "detection/scenes.rs"]
+#[expect(dead_code, reason = "the other tests use the rest")]
+mod scenes;
+
+use std::sync::Arc;
+
+use palpate_contact::{IntersectionOptions, Method, Scene, SceneOptions};
+use palpate_model::{Mesh, MeshData};
+
+use scenes::{Point, Positions, Random, as_slices, deforming, horseshoe, jittered, soup};
+
+/// Frames in total: each a scene of 2 to 30 triangles of its own.
+const SCENES: usize = 100_000;
+/// Frames that one set of meshes goes through.
+const FRAMES: usize = 50;
+
+fn below(random: &mut Random, end: u64) -> u64 {
+    (random.bits() >> 11) % end
+}
+
+/// A strip, fan or loose set of triangles.
+fn patch(triangle_count: u64, random: &mut Random) -> Arc<Mesh> {
+    let mut data = MeshData::default();
+    let kind = below(random, 3);
+    for i in 0..triangle_count as u32 {
+        data.triangles.push(match kind {
+            0 => [i, i + 1, i + 2],
+            1 => [0, i + 1, i + 2],
+            _ => [3 * i, 3 * i + 1, 3 * i + 2],
+        });
+    }
+    let nodes = data.triangles.iter().flatten().max().map_or(0, |last| last + 1);
+    data.nodes = (0..nodes).map(|_| random.vector(1.0)).collect();
+    Arc::new(Mesh::new(data).expect("different corners"))
+}
+
+/// Positions that a filter might get wrong.
+fn place(meshes: &[Arc<Mesh>], random: &mut Random) -> Positions {
+    let kind = below(random, 9);
+    let flat = below(random, 5) == 0;
+    let offset = random.vector(1.0);
+    // Neighbours in f32 around one, whatever it is.
+    let scale = 10_f64.powi(below(random, 60) as i32 - 30);
+    let mut point = |_: &Point| -> Point {
+        let p = random.vector(1.0);
+        let moved: Point = std::array::from_fn(|axis| match kind {
+            0 | 1 => p[axis],
+            // Few values: coplanar, touching, degenerate.
+            2 | 3 => (4.0 * p[axis]).round(),
+            4 => 1.0 + (3.0 * p[axis]).round() * f64::from(f32::EPSILON) / 2.0,
+            5 => 1e8 * offset[axis] + p[axis],
+            6 => scale * p[axis],
+            7 => 1.0 + (3.0 * p[axis]).round() * f64::EPSILON,
+            _ => 1e39 * (2.0 * p[axis]).round() + p[axis],
+        });
+        if flat { [moved[0], moved[1], moved[0] + moved[1]] } else { moved }
+    };
+    meshes.iter().map(|mesh| mesh.nodes().iter().map(&mut point).collect()).collect()
+}
+
+#[test]
+fn very_many_small_scenes_have_the_pairs_of_the_double_loop() {
+    let mut random = Random(2008);
+    let (mut meeting, mut close) = (0, 0);
+    for _ in 0..SCENES / FRAMES {
+        let first = 1 + below(&mut random, 15);
+        let meshes = [patch(first, &mut random), patch(1 + below(&mut random, 15), &mut random)];
+        let of = |method| {
+            let options = SceneOptions { method, ..SceneOptions::default() };
+            Scene::new(meshes.to_vec(), None, options).expect("two meshes")
+        };
+        let (mut wide, mut slow) = (of(Method::Wide), of(Method::AllPairs));
+        for frame in 0..FRAMES {
+            let positions = place(&meshes, &mut random);
+            wide.update(&as_slices(&positions)).expect("finite positions");
+            slow.update(&as_slices(&positions)).expect("finite positions");
+            let expected = &slow.intersections(&IntersectionOptions::default()).pairs;
+            let found = &wide.intersections(&IntersectionOptions::default()).pairs;
+            assert_eq!(found, expected, "{positions:?}");
+            meeting += expected.len();
+            if frame % 5 == 0 {
+                let size =
+                    positions.iter().flatten().flatten().fold(0.0, |m: f64, v| m.max(v.abs()));
+                let limit = size * 10_f64.powi(-(below(&mut random, 18) as i32));
+                let expected = &slow.proximity(&|_, _| Some(limit)).pairs;
+                let found = &wide.proximity(&|_, _| Some(limit)).pairs;
+                assert_eq!(found, expected, "{limit}: {positions:?}");
+                close += expected.len();
+            }
+        }
+    }
+    assert!(meeting > SCENES && close > SCENES, "{meeting} {close}");
+}
+
+#[test]
+fn results_are_the_same_at_any_number_of_threads() {
+    let mut random = Random(17);
+    let meshes = vec![
+        horseshoe(40, 3, [0.0; 3]),
+        jittered([9, 9, 9], [0.0, 4.0, 4.0], 0.1, &mut random),
+        soup(300, 8.0, &mut random),
+        soup(1, 2.0, &mut random),
+    ];
+    let case = deforming(meshes, 2, &mut random);
+    for frame in &case.frames {
+        let mut previous = None;
+        for threads in [1, 2, 3, 8] {
+            let options = SceneOptions { method: Method::Wide, threads, ..Default::default() };
+            let mut scene = Scene::new(case.meshes.clone(), None, options).expect("meshes");
+            scene.update(&as_slices(frame)).expect("finite positions");
+            let meeting = scene.intersections(&IntersectionOptions::default());
+            let (pairs, tests) = (meeting.pairs.clone(), meeting.stats.polygon_tests);
+            let close = scene.proximity(&|_, _| Some(0.05));
+            let found = (pairs, tests, close.pairs.clone(), close.stats.polygon_tests);
+            assert!(!found.0.is_empty() && !found.2.is_empty());
+            assert!(*previous.get_or_insert_with(|| found.clone()) == found, "{threads} threads");
+        }
+    }
+}
+
+#[test]
+fn bodies_come_and_go() {
+    let mut random = Random(23);
+    let meshes: Vec<_> = (0..4).map(|_| soup(20, 1.5, &mut random)).collect();
+    let of = |method| {
+        let options = SceneOptions { method, ..SceneOptions::default() };
+        Scene::new(meshes[..3].to_vec(), None, options).expect("meshes")
+    };
+    let (mut wide, mut slow) = (of(Method::Wide), of(Method::AllPairs));
+    for step in 0..4 {
+        for scene in [&mut wide, &mut slow] {
+            match step {
+                0 => drop(scene.remove(1).expect("it is there")),
+                1 => drop(scene.replace(0, Arc::clone(&meshes[3])).expect("it is there")),
+                2 => drop(scene.add(Arc::clone(&meshes[0]))),
+                _ => drop(scene.add(Arc::clone(&meshes[0]))),
+            }
+        }
+        let expected = &slow.intersections(&IntersectionOptions::default()).pairs;
+        assert!(!expected.is_empty());
+        assert_eq!(&wide.intersections(&IntersectionOptions::default()).pairs, expected);
+    }
+}
