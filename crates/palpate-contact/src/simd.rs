@@ -4,6 +4,8 @@
 //! at run time. No operation is fused, reordered or approximate, so both give the same results.
 
 #![allow(unsafe_code)]
+#![allow(clippy::inline_always, reason = "what is not inlined is not compiled for the processor")]
+#![allow(clippy::wildcard_imports, reason = "every name says that it is an intrinsic")]
 
 #[cfg(target_arch = "x86_64")]
 use std::arch::x86_64::*;

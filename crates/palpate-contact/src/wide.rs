@@ -5,6 +5,8 @@
 //! missed. What never changes is precomputed: which triangles share a node, and which features of
 //! those that do are still pairs.
 
+#![allow(clippy::inline_always, reason = "kernels must be inlined: see `simd`")]
+
 mod adjacency;
 mod boxes;
 mod features;

@@ -134,7 +134,6 @@ fn bodies_come_and_go() {
             match step {
                 0 => drop(scene.remove(1).expect("it is there")),
                 1 => drop(scene.replace(0, Arc::clone(&meshes[3])).expect("it is there")),
-                2 => drop(scene.add(Arc::clone(&meshes[0]))),
                 _ => drop(scene.add(Arc::clone(&meshes[0]))),
             }
         }

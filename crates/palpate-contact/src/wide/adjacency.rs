@@ -178,7 +178,7 @@ fn free_features([a, b]: [[u32; 4]; 2], [owned_a, owned_b]: [u8; 2]) -> u16 {
 #[inline]
 pub(crate) fn owned_pairs(owned_a: u8, owned_b: u8) -> u16 {
     let (a, b) = (u16::from(owned_a), u16::from(owned_b));
-    let edges_b = b >> 3;
-    let edges = (a >> 3 & 1) * edges_b | (a >> 4 & 1) * edges_b << 3 | (a >> 5 & 1) * edges_b << 6;
+    let rows = [3, 4, 5].map(|bit| (a >> bit & 1) * (b >> 3));
+    let edges = rows[0] | rows[1] << 3 | rows[2] << 6;
     a & 7 | (b & 7) << 3 | edges << 6
 }

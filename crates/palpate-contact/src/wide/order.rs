@@ -55,8 +55,8 @@ mod tests {
         for count in 9..5000 {
             let left = left_count(count);
             assert!(0 < left && left < count, "{left} of {count}");
-            assert_eq!(left % 8, 0);
-            assert!(count <= 64 || left % 64 == 0);
+            assert!(left.is_multiple_of(8));
+            assert!(count <= 64 || left.is_multiple_of(64));
         }
     }
 }

@@ -30,7 +30,7 @@ impl Reach {
     /// across `axis` wider than the margin. Any axis is right, the best is along the closest points.
     #[inline(always)]
     pub(super) fn separated<L: Lanes, const A: usize, const B: usize>(
-        &self,
+        self,
         axis: [L; 3],
         a: [[L; 3]; A],
         b: [[L; 3]; B],
