@@ -24,11 +24,22 @@ class Camera:
     width: float
     height: float
 
+    def size(self, columns: int) -> tuple[int, int]:
+        """Columns and rows of a picture with square pixels, both divisible by 8."""
+        columns = max(8, columns // 8 * 8)
+        return columns, max(8, round(columns * self.height / self.width / 8) * 8)
+
+    def fitted(self, size: tuple[int, int]) -> Camera:
+        """The same view, widened or heightened so that a picture of that size is not distorted."""
+        aspect = size[0] / size[1]
+        width, height = max(self.width, self.height * aspect), max(self.height, self.width / aspect)
+        return Camera(self.axes, self.center, width, height)
+
     def project(self, points: Float64Array, size: tuple[int, int]) -> Float64Array:
         """Pixel coordinates (column, row from the top) and height towards the eye [m], (n, 3)."""
         columns, rows = size
         seen = points @ self.axes.T
-        result = np.empty_like(seen)
+        result: Float64Array = np.empty(seen.shape)
         result[:, 0] = (seen[:, 0] - self.center[0] + self.width / 2) * (columns / self.width)
         result[:, 1] = (self.center[1] + self.height / 2 - seen[:, 1]) * (rows / self.height)
         result[:, 2] = seen[:, 2]
@@ -64,9 +75,9 @@ def frame(
     *,
     up: Sequence[float] = (0.0, 0.0, 1.0),
     context: Iterable[Float64Array] = (),
-    aspect: float = 4 / 3,
-    elevation: float = 18.0,
-    margin: float = 0.08,
+    aspect: float | None = None,
+    elevation: float = 24.0,
+    margin: float = 0.07,
 ) -> Camera:
     """A camera that sees all ``points`` from the side on which they are widest.
 
@@ -78,16 +89,17 @@ def frame(
         The direction that is up in the picture, usually against gravity.
     context : iterable of arrays of shape (n, 3)
         Positions that are shown as far as they widen the picture by at most a quarter: a table.
-    aspect : float
-        Width of the picture over its height.
+    aspect : float, optional
+        Width of the picture over its height; by default what suits the scene, from 1 to 1.8.
     elevation : float
         Degrees above the horizon.
     margin : float
         Free border on each side, as a fraction of the picture.
     """
-    cloud = np.concatenate([np.asarray(part, dtype=np.float64).reshape(-1, 3) for part in points])
-    if len(cloud) == 0:
+    parts = [np.asarray(part, dtype=np.float64).reshape(-1, 3) for part in points]
+    if sum(map(len, parts)) == 0:
         raise ValueError("points: expected at least one point to frame")
+    cloud = np.concatenate(parts)
     axes = view_axes(up, azimuth=_widest_azimuth(cloud, up), elevation=elevation)
     seen = cloud @ axes.T
     low, high = seen[:, :2].min(axis=0), seen[:, :2].max(axis=0)
@@ -101,6 +113,8 @@ def frame(
         high = np.minimum(np.maximum(high, other[:, :2].max(axis=0)), high + spare)
         size = np.maximum(high - low, size)
     width, height = size / (1 - 2 * margin)
+    if aspect is None:
+        aspect = float(np.clip(width / height, 1.0, 1.8))
     width, height = max(width, height * aspect), max(height, width / aspect)
     middle = (low + high) / 2
     return Camera(axes, (float(middle[0]), float(middle[1])), float(width), float(height))

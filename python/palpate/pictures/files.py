@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -73,7 +72,9 @@ def save_picture(
     if title:
         axes.text(pad, pad, title, color=_INK, fontsize=points * 1.15, va="top", weight="bold")
     if camera is not None:
-        _scale_bar(axes, camera, (total - columns, columns, rows), pad, points)
+        _scale_bar(
+            axes, camera.fitted((columns, rows)), (total - columns, columns, rows), pad, points
+        )
     with replacing(path) as temporary:
         canvas.print_png(str(temporary))
 
@@ -127,8 +128,3 @@ def _matplotlib() -> tuple[Any, Any]:
     except ImportError:
         raise PictureError("pictures need matplotlib: pip install 'palpate[plot]'") from None
     return Figure, FigureCanvasAgg
-
-
-def picture_path(folder: Path, name: str) -> Path:
-    """Where the picture of that name stands."""
-    return folder / f"{name}.png"

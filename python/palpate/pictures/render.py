@@ -11,6 +11,7 @@ import numpy.typing as npt
 from palpate._arrays import Float64Array
 from palpate.pictures.camera import Camera
 from palpate.pictures.raster import Fragments, rasterize
+from palpate.pictures.shadow import surroundings_shade
 
 FloatImage = npt.NDArray[np.float32]
 Image = npt.NDArray[np.uint8]
@@ -26,14 +27,17 @@ PALETTE = (
     (0.42, 0.62, 0.66),
     (0.66, 0.58, 0.42),
 )
-RIGID = (0.72, 0.74, 0.77)
+RIGID = (0.80, 0.81, 0.83)
 HIGHLIGHT = (1.0, 0.86, 0.20)
 #: Top and bottom of the background.
 BACKGROUND = ((0.985, 0.988, 0.992), (0.90, 0.915, 0.935))
 
-#: Directions to the lights in camera axes (right, up, towards the eye), and their strength.
-_LIGHTS = (((-0.45, 0.75, 0.65), 0.62), ((0.85, 0.10, 0.50), 0.20), ((0.0, -0.6, 0.4), 0.08))
-_AMBIENT = 0.26
+#: Directions to the lights in camera axes (right, up, towards the eye), and their strength; the
+#: first casts shadows.
+_LIGHTS = (((-0.45, 0.75, 0.65), 0.58), ((0.85, 0.10, 0.50), 0.20), ((0.0, -0.6, 0.4), 0.12))
+_AMBIENT = 0.36
+#: Cosine of the angle from which an edge is drawn sharp.
+_CREASE = 0.7
 #: How much of a rigid body's surface is seen where it stands before a deformable one.
 _VEIL = 0.28
 
@@ -57,7 +61,7 @@ def render(
     shapes: Sequence[Shape],
     camera: Camera,
     *,
-    size: tuple[int, int] = (1280, 960),
+    size: tuple[int, int] | None = None,
     samples: int = 2,
 ) -> Image:
     """Draw shapes; returns an image of shape (rows, columns, 3).
@@ -67,26 +71,28 @@ def render(
     shapes : sequence of Shape
         Rigid ones are drawn as a veil where they stand before a deformable one.
     camera : Camera
-        Its aspect should be that of ``size``.
-    size : two ints
-        Columns and rows of the image.
+        Shows a little more where ``size`` has another aspect.
+    size : two ints, optional
+        Columns and rows of the image; by default 1280 columns, and the rows that suit the camera.
     samples : int
         Each pixel is the mean of ``samples`` squared.
     """
+    size = camera.size(1280) if size is None else size
+    camera = camera.fitted(size)
     fine = (size[0] * samples, size[1] * samples)
     solid = [shape for shape in shapes if not shape.rigid and shape.opacity >= 1]
     clear = [shape for shape in shapes if not shape.rigid and shape.opacity < 1]
     rigid = [shape for shape in shapes if shape.rigid]
     image = _background(fine)
-    occlusion_radius = 0.03 * min(camera.width, camera.height)
     front = np.full(fine[0] * fine[1], -np.inf, dtype=np.float32)
     layers = [(_layer(group, camera, fine), group) for group in (rigid, solid, clear) if group]
     # Depth of everything opaque darkens the creases, whichever shape it belongs to.
     opaque = front.copy()
     for layer, group in layers:
         if group is not clear:
-            np.maximum.at(opaque, layer.fragments.pixels, layer.fragments.depths)
-    shade = _crease_shade(opaque, camera, fine, samples, occlusion_radius)
+            seen = layer.fragments.pixels
+            opaque[seen] = np.maximum(opaque[seen], layer.fragments.depths)
+    shade = surroundings_shade(opaque, camera, fine, samples, _LIGHTS[0][0])
     for layer, group in layers:
         seen, depths = layer.fragments.pixels, layer.fragments.depths
         if group is rigid:
@@ -130,7 +136,7 @@ def _layer(shapes: Sequence[Shape], camera: Camera, size: tuple[int, int]) -> _L
             for shape, start in zip(shapes, offsets, strict=False)
         ]
     )
-    normals = (_vertex_normals(points, triangles) @ camera.axes.T).astype(np.float32)
+    normals = (_corner_normals(points, triangles) @ camera.axes.T).astype(np.float32)
     marks = np.concatenate(
         [
             np.zeros(len(shape.positions)) if shape.highlights is None else shape.highlights
@@ -146,7 +152,7 @@ def _layer(shapes: Sequence[Shape], camera: Camera, size: tuple[int, int]) -> _L
     # A steep ramp: the marked zone has a clear border.
     mark = np.clip(1.6 * mark - 0.3, 0, 1)[:, None]
     base = base * (1 - 0.85 * mark) + np.asarray(HIGHLIGHT, dtype=np.float32) * (0.85 * mark)
-    normal = np.einsum("kcx,kc->kx", normals[corners], weights)
+    normal = np.einsum("kcx,kc->kx", normals[fragments.triangles], weights)
     opacity = np.asarray([shape.opacity for shape in shapes], dtype=np.float32)[owner]
     return _Layer(fragments, _lit(base, normal), opacity)
 
@@ -173,8 +179,12 @@ def _lit(base: FloatImage, normal: FloatImage) -> FloatImage:
     return np.asarray(color, dtype=np.float32)
 
 
-def _vertex_normals(points: Float64Array, triangles: npt.NDArray[np.int64]) -> Float64Array:
-    """Unit normals at the nodes: the sum of the triangles' around, by area."""
+def _corner_normals(points: Float64Array, triangles: npt.NDArray[np.int64]) -> Float64Array:
+    """Normals at the three corners of each triangle, (t, 3, 3).
+
+    The mean around the node, by area; the triangle's own where it is off that by more than
+    ``_CREASE``, so that the edges of a box stay sharp.
+    """
     a, b, c = (points[triangles[:, corner]] for corner in range(3))
     face = np.cross(b - a, c - a)
     normals = np.zeros_like(points)
@@ -183,7 +193,14 @@ def _vertex_normals(points: Float64Array, triangles: npt.NDArray[np.int64]) -> F
             normals[:, axis] += np.bincount(
                 triangles[:, corner], weights=face[:, axis], minlength=len(points)
             )
-    return np.asarray(normals / np.maximum(np.linalg.norm(normals, axis=1), 1e-300)[:, None])
+    own = _normalized(face)[:, None, :]
+    mean = _normalized(normals)[triangles]
+    smooth = (own * mean).sum(axis=2, keepdims=True) > _CREASE
+    return np.where(smooth, mean, own)
+
+
+def _normalized(vectors: Float64Array) -> Float64Array:
+    return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=1), 1e-300)[:, None])
 
 
 def _background(size: tuple[int, int]) -> FloatImage:
@@ -191,59 +208,3 @@ def _background(size: tuple[int, int]) -> FloatImage:
     blend = np.linspace(0, 1, rows, dtype=np.float32)[:, None]
     top, bottom = (np.asarray(color, dtype=np.float32) for color in BACKGROUND)
     return np.repeat(top * (1 - blend) + bottom * blend, columns, axis=0)
-
-
-def _crease_shade(
-    depth: npt.NDArray[np.float32],
-    camera: Camera,
-    size: tuple[int, int],
-    samples: int,
-    radius: float,
-) -> npt.NDArray[np.float32]:
-    """Darkening in 0..1 of pixels whose surroundings stand nearer to the eye: ambient occlusion.
-
-    Worked out on every ``2 * samples``-th pixel and spread, since it is smooth.
-    """
-    columns, rows = size
-    step = 2 * samples if columns % (2 * samples) == 0 and rows % (2 * samples) == 0 else 1
-    coarse = depth.reshape(rows, columns)[step // 2 :: step, step // 2 :: step]
-    pixel = camera.width / coarse.shape[1]
-    dark = np.zeros(coarse.shape, dtype=np.float32)
-    total = 0.0
-    for ring in (0.35, 0.7, 1.0):
-        reach = max(1, round(ring * radius / pixel))
-        for turn in range(10):
-            angle = 2 * np.pi * (turn + ring) / 10
-            shift_x, shift_y = round(reach * np.cos(angle)), round(reach * np.sin(angle))
-            higher = _shifted(coarse, shift_x, shift_y) - coarse
-            slope = higher / (reach * pixel)
-            # Much nearer things are other objects far in front: their shadow fades.
-            fade = np.clip(2.0 - higher / (1.5 * radius), 0, 1)
-            dark += np.where(slope > 0.15, np.clip(slope, 0, 1.5) * fade, 0).astype(np.float32)
-            total += 1.5
-    dark[~np.isfinite(coarse)] = 0
-    light = np.clip(1 - 1.15 * _blurred(dark / total), 0.35, 1)
-    return np.repeat(np.repeat(light, step, axis=0), step, axis=1).reshape(-1)
-
-
-def _shifted(image: npt.NDArray[np.float32], x: int, y: int) -> npt.NDArray[np.float32]:
-    """The image moved by whole pixels; what comes in from outside is far away."""
-    result = np.full_like(image, -1e30)
-    rows, columns = image.shape
-    if abs(x) >= columns or abs(y) >= rows:
-        return result
-    to = (slice(max(0, -y), rows - max(0, y)), slice(max(0, -x), columns - max(0, x)))
-    source = (slice(max(0, y), rows - max(0, -y)), slice(max(0, x), columns - max(0, -x)))
-    result[to] = np.maximum(image[source], -1e30)
-    return result
-
-
-def _blurred(image: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
-    """Mean over 3 x 3 pixels."""
-    padded = np.pad(image, 1, mode="edge")
-    rows, columns = image.shape
-    total = np.zeros_like(image)
-    for y in range(3):
-        for x in range(3):
-            total += padded[y : y + rows, x : x + columns]
-    return np.asarray(total / 9, dtype=np.float32)
