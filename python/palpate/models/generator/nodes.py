@@ -111,3 +111,9 @@ def interior_nodes(
             samples.volume[mine], weights[mine], owner[mine] - len(surface), count, seeds
         )
     return seeds
+
+
+def mean_spacing(x: Points) -> float:
+    """Mean distance [m] of a node to its six nearest neighbours."""
+    distances, _ = cKDTree(x).query(x, k=7)
+    return float(distances[:, 1:].mean())
