@@ -1,0 +1,1 @@
+"""What a run leaves: measures, frames, pictures, files that are complete or absent."""

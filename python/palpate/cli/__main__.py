@@ -1,0 +1,5 @@
+"""`python -m palpate.cli`."""
+
+from palpate.cli.app import main
+
+main()

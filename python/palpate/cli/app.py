@@ -1,0 +1,65 @@
+"""The commands together."""
+
+from __future__ import annotations
+
+import sys
+from typing import Annotated
+
+import typer
+
+from palpate._core import __version__
+from palpate.cli.check import check
+from palpate.cli.convert import convert
+from palpate.cli.detect import detect
+from palpate.cli.format import format_file
+from palpate.cli.output import reporting
+from palpate.cli.simulate import simulate
+from palpate.cli.tree import tree
+
+app = typer.Typer(
+    name="palpate",
+    help="Contact detection and deformation of soft bodies made of tetrahedra.",
+    epilog="A MODEL is a .bml file or the name of a bundled one, such as small or case1.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+def _print_version(asked: bool) -> None:
+    if asked:
+        typer.echo(f"palpate {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    _version: Annotated[
+        bool,
+        typer.Option(
+            "--version", callback=_print_version, is_eager=True, help="Print the version and exit."
+        ),
+    ] = False,
+) -> None:
+    pass
+
+
+for _name, _command in (
+    ("check", check),
+    ("tree", tree),
+    ("detect", detect),
+    ("simulate", simulate),
+    ("convert", convert),
+    ("format", format_file),
+):
+    app.command(_name)(reporting(_command))
+
+
+def main() -> None:
+    """Run the command line on ``sys.argv`` and exit: 0 fine, 1 bad input, 2 wrong usage."""
+    for stream in (sys.stdout, sys.stderr):
+        if hasattr(stream, "reconfigure"):
+            # A terminal that does not know m³ shows m? instead of a traceback.
+            stream.reconfigure(errors="replace")
+    app()

@@ -1,0 +1,146 @@
+"""The loop of `palpate simulate`: step, write frames, stop on Ctrl-C."""
+
+from __future__ import annotations
+
+import json
+import platform
+import signal
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from palpate import _core
+from palpate.cli.output import console, plain
+from palpate.errors import SimulationError
+from palpate.results.album import Album
+from palpate.results.atomic import write_bytes
+from palpate.results.frames import FrameSeries
+from palpate.results.record import Record
+from palpate.simulation import Simulation
+
+
+@dataclass(frozen=True)
+class RunOptions:
+    """What the user asked for."""
+
+    model: str | None
+    steps: int
+    every: int
+    threads: int
+    leaf_size: int | None
+    method: str | None
+    checkpoint: bool
+    pictures: bool
+
+
+class Run:
+    """One run into one folder; ``files`` are those written, by what they are."""
+
+    def __init__(
+        self, simulation: Simulation, folder: Path, options: RunOptions, *, quiet: bool
+    ) -> None:
+        self._simulation = simulation
+        self._folder = folder
+        self._options = options
+        self._quiet = quiet
+        self.files: dict[str, Path] = {}
+        folder.mkdir(parents=True, exist_ok=True)
+        pictures = [folder / "pictures" / f"{name}.png" for name in _PICTURES]
+        for old in [folder / "report.json", *pictures]:
+            old.unlink(missing_ok=True)
+
+    def go(self) -> dict[str, Any]:
+        """Step to the end or to Ctrl-C and write everything; returns the report."""
+        simulation, options = self._simulation, self._options
+        record = Record(simulation)
+        frames = FrameSeries(self._folder, simulation.model)
+        album = Album(simulation.model)
+        started, start_time = time.perf_counter(), simulation.time
+        frames.add(simulation)
+        album.add(simulation)
+        failure = None
+        with _stop_signal() as stop, _progress(options.steps, quiet=self._quiet) as advance:
+            for step in range(1, options.steps + 1):
+                try:
+                    record.add(simulation.step(), simulation)
+                except SimulationError as error:
+                    failure = str(error)
+                    break
+                album.add(simulation)
+                if step % options.every == 0 or step == options.steps or stop:
+                    record.observe(simulation)
+                    frames.add(simulation)
+                advance()
+                if stop:
+                    break
+            # A second Ctrl-C while these are written must not cut them off.
+            frames.finish()
+            self.files["frames"] = frames.index
+            if options.checkpoint:
+                self.files["checkpoint"] = self._folder / "checkpoint.palpate"
+                simulation.save(self.files["checkpoint"])
+            if options.pictures:
+                self.files["pictures"] = self._draw(album)
+            report = {
+                "model": options.model,
+                "options": {**asdict(options), "time_step": simulation.time_step},
+                "versions": versions(),
+                "interrupted": bool(stop) and len(record) < options.steps,
+                "failure": failure,
+                "start_time": start_time,
+                "end_time": simulation.time,
+                "wall_time": time.perf_counter() - started,
+                "frame_count": len(frames),
+                **record.summary(),
+            }
+            self.files["report"] = self._folder / "report.json"
+            text = json.dumps(plain(report), indent=1, allow_nan=False) + "\n"
+            write_bytes(self.files["report"], text.encode("utf-8"))
+        return report
+
+    def _draw(self, album: Album) -> Path:
+        return album.write(self._folder / "pictures")[-1]
+
+
+_PICTURES = ("first", "middle", "last", "strip")
+
+
+def versions() -> dict[str, str]:
+    """What the results were made with."""
+    return {
+        "palpate": _core.__version__,
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+        "platform": platform.platform(),
+    }
+
+
+@contextmanager
+def _stop_signal() -> Iterator[list[int]]:
+    """A list that is empty until Ctrl-C; the step under way is finished first."""
+    caught: list[int] = []
+    before = signal.signal(signal.SIGINT, lambda number, _frame: caught.append(number))
+    try:
+        yield caught
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+@contextmanager
+def _progress(steps: int, *, quiet: bool) -> Iterator[Any]:
+    """A function to call after each step: moves a bar on a terminal, else does nothing."""
+    if quiet or not sys.stderr.isatty():
+        yield lambda: None
+        return
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeRemainingColumn
+
+    columns = (BarColumn(), MofNCompleteColumn(), "steps", TimeRemainingColumn())
+    with Progress(*columns, console=console(error=True), transient=True) as progress:
+        task = progress.add_task("", total=steps)
+        yield lambda: progress.advance(task)

@@ -1,0 +1,26 @@
+"""Measures of tetrahedra: volume and shape."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from palpate._arrays import Float64Array, IndexArray
+
+
+def signed_volumes(nodes: Float64Array, tetrahedra: IndexArray) -> Float64Array:
+    """Volume [m³] of each tetrahedron, shape (m,); negative when it is turned inside out."""
+    edges = nodes[tetrahedra[:, 1:]] - nodes[tetrahedra[:, :1]]
+    return np.asarray(np.einsum("mi,mi->m", np.cross(edges[:, 0], edges[:, 1]), edges[:, 2]) / 6)
+
+
+def mean_ratios(nodes: Float64Array, tetrahedra: IndexArray) -> Float64Array:
+    """Shape of each tetrahedron, shape (m,): 1 regular, 0 flat, negative inside out.
+
+    Mean ratio ``12 (3 V)^(2/3) / sum of squared edges`` (Liu and Joe 1994).
+    """
+    volumes = signed_volumes(nodes, tetrahedra)
+    corners = nodes[tetrahedra]
+    squares = sum(
+        np.sum((corners[:, a] - corners[:, b]) ** 2, axis=1) for a in range(4) for b in range(a)
+    )
+    return np.asarray(np.sign(volumes) * 12 * np.cbrt(3 * np.abs(volumes)) ** 2 / squares)
