@@ -17,7 +17,7 @@ use palpate_solver::{
 
 use super::element::{lame_parameters, shape_gradients, stiffness_block};
 use super::frame::best_rotation;
-use super::inertia::Inertia;
+use super::inertia::{Inertia, RunningInertia};
 use crate::error::MechanicsError;
 
 const FIXED: u32 = u32::MAX;
@@ -187,6 +187,9 @@ impl ElasticBody {
             self.step.correction[place] = force.to_array();
         }
         self.factor.solve_in_place(&mut self.step.correction, &mut self.step.workspace);
+        if self.is_unattached() {
+            self.remove_torque(self.next_spin(x, forces, &[]));
+        }
     }
 
     /// Rotates the body exactly about its centre and carries the rest of the velocity along, so that a
@@ -236,48 +239,56 @@ impl ElasticBody {
 
     /// Elastic and damping forces in the frame at the predicted state.
     ///
-    /// The frame turns with the body, dR = [theta] R with theta = H^-1 sum m (R X) x dx. The gradient
-    /// of the energy through it adds `m (H^-1 tau) x X` to the forces -K u, tau being their torque:
-    /// exactly what makes the torque of all internal forces vanish.
+    /// The frame turns with the body, so the gradient of the energy has one more term; it is what
+    /// makes the torque of the internal forces vanish. Taken explicitly it is unstable when a body
+    /// folds, so it is left out here, and [`ElasticBody::remove_torque`] does its work on the result.
+    /// Where nodes are fixed, they take that torque: it is of second order in the strain.
     fn internal_forces(&mut self) {
         let to_frame = self.step.frame.transpose();
-        let center = self.predicted_center();
-        let (mut velocity, mut total) = (DVec3::ZERO, 0.0);
-        for (&m, &v) in self.masses.iter().zip(&self.step.velocities) {
-            velocity += m * v;
-            total += m;
-        }
-        velocity /= total;
         // Rotation of the predicted body, to be left out of the damping.
-        let (mut spin, mut second) = (DVec3::ZERO, DMat3::ZERO);
-        let mut fit = DMat3::ZERO;
-        for node in 0..self.masses.len() {
-            let m = self.masses[node];
-            let r = to_frame * (self.step.positions[node] - center);
-            let v = to_frame * (self.step.velocities[node] - velocity);
-            spin += m * r.cross(v);
-            second += DMat3::from_cols(m * r.x * r, m * r.y * r, m * r.z * r);
-            let rest = self.rest[node];
-            fit += DMat3::from_cols(m * rest.x * r, m * rest.y * r, m * rest.z * r);
+        let mut sum = RunningInertia::default();
+        for (node, &m) in self.masses.iter().enumerate() {
+            sum.add(m, self.step.positions[node], self.step.velocities[node]);
         }
-        let omega = complement(second).inverse() * spin;
+        let now = sum.finish();
+        let omega = now.tensor.inverse() * now.spin;
         for node in 0..self.masses.len() {
-            let r = to_frame * (self.step.positions[node] - center);
-            let v = to_frame * (self.step.velocities[node] - velocity) - omega.cross(r);
+            let r = self.step.positions[node] - now.center;
+            let v = to_frame * (self.step.velocities[node] - now.velocity - omega.cross(r));
+            let r = to_frame * r;
             self.step.deformation[node] = v;
             self.step.strain[node] = (r - self.rest[node] + self.damping * v).to_array();
         }
         self.stiffness.multiply(&self.step.strain, &mut self.step.force);
-        let mut torque = DVec3::ZERO;
-        for (&x, &force) in self.step.positions.iter().zip(&self.step.force) {
-            torque += (to_frame * (x - center)).cross(DVec3::from_array(force));
+        for force in &mut self.step.force {
+            *force = force.map(|f| -f);
         }
-        let turning = complement(fit).inverse() * torque;
-        let turning = if turning.is_finite() { turning } else { DVec3::ZERO };
-        for (node, force) in self.step.force.iter_mut().enumerate() {
-            let exact =
-                self.masses[node] * turning.cross(self.rest[node]) - DVec3::from_array(*force);
-            *force = exact.to_array();
+    }
+
+    /// Turns the correction so that only external torques have changed the angular momentum.
+    fn remove_torque(&mut self, target: DVec3) {
+        let dt = self.time_step;
+        let frame = self.step.frame;
+        let moved = |step: &Step, node: usize| {
+            let d = frame * DVec3::from_array(step.correction[node]);
+            (step.positions[node] + d, step.velocities[node] + d / dt)
+        };
+        let mut sum = RunningInertia::default();
+        for (node, &m) in self.masses.iter().enumerate() {
+            let (x, v) = moved(&self.step, node);
+            sum.add(m, x, v);
+        }
+        let now = sum.finish();
+        let omega = now.tensor.inverse() * (target - now.spin);
+        if !omega.is_finite() {
+            return;
+        }
+        for node in 0..self.masses.len() {
+            let (x, _) = moved(&self.step, node);
+            let turned = frame.transpose() * (dt * omega.cross(x - now.center));
+            for (d, more) in self.step.correction[node].iter_mut().zip(turned.to_array()) {
+                *d += more;
+            }
         }
     }
 
@@ -368,11 +379,13 @@ impl ElasticBody {
     /// Angular momentum about the centre after the step: only external torques change it.
     fn next_spin(&self, x: &[Point], forces: &[Point], contact: &[Point]) -> DVec3 {
         let start = &self.step.start;
-        let mut torque = DVec3::ZERO;
-        for ((&x, &f), &contact) in x.iter().zip(forces).zip(contact) {
-            let force = DVec3::from_array(f) + DVec3::from_array(contact);
-            torque += (DVec3::from_array(x) - start.center).cross(force);
-        }
+        let torque_of = |forces: &[Point]| -> DVec3 {
+            let pairs = x.iter().zip(forces);
+            pairs
+                .map(|(&x, &f)| (DVec3::from_array(x) - start.center).cross(DVec3::from_array(f)))
+                .sum()
+        };
+        let torque = torque_of(forces) + torque_of(contact);
         (start.spin + self.time_step * torque) / (1.0 + self.mass_damping * self.time_step)
     }
 
@@ -421,13 +434,6 @@ impl ElasticBody {
         let pairs = strain.as_flattened().iter().zip(product.as_flattened());
         0.5 * pairs.map(|(u, f)| u * f).sum::<f64>()
     }
-}
-
-/// tr(S) I - S for the symmetric part S of `m`.
-fn complement(m: DMat3) -> DMat3 {
-    let symmetric = (m + m.transpose()) * 0.5;
-    let trace = m.x_axis.x + m.y_axis.y + m.z_axis.z;
-    DMat3::from_diagonal(DVec3::splat(trace)) - symmetric
 }
 
 /// A over the free nodes.

@@ -1,6 +1,6 @@
-//! Which contacts push, and how hard; which stick and which slide.
+//! Which contacts push, and how hard; how much they rub.
 //!
-//! Newton's method on a piecewise linear problem: guess which contacts push, solve the linear system
+//! Without friction: Newton's method on a piecewise linear problem: guess which contacts push, solve the linear system
 //! of those, correct the guess from the gaps, until the guess is right.
 
 use palpate_solver::{DenseCholesky, FactorError};
@@ -10,17 +10,14 @@ use super::problem::Problem;
 
 /// Rounds of the Newton iteration before the fallback.
 const MAX_ROUNDS: usize = 30;
-/// Sweeps of the fallback (projected Gauss-Seidel, which always converges).
-const MAX_SWEEPS: usize = 2_000;
-/// Rounds of the friction iteration, and the round after which sliding is final.
-const MAX_FRICTION_ROUNDS: usize = 40;
-const SLIDING_IS_FINAL: usize = 12;
+/// Sweeps of Gauss-Seidel.
+const MAX_SWEEPS: usize = 1_000;
 /// A contact that is limited in its recovery is this many times stiffer than the penalty.
 const RECOVERY_STIFFNESS: f64 = 100.0;
 /// Smallest softness of an equation relative to its own compliance: keeps the matrix regular.
 const SOFTNESS_FLOOR: f64 = 1e-6;
-/// Sliding forces have converged when they change by less than this part.
-const FRICTION_TOLERANCE: f64 = 1e-6;
+/// Sweeps end when no force changes by more than this part of the largest one.
+const SWEEP_TOLERANCE: f64 = 1e-7;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Mode {
@@ -29,16 +26,12 @@ enum Mode {
     Elastic,
     /// As hard as it takes to reach the recovery gap, which is less than the penalty.
     Recovering,
-    /// Held along this tangent.
-    Stick,
-    /// Pushed along this tangent by a given force.
-    Slide,
 }
 
 /// What a solution took.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct SolveCost {
-    /// Linear systems solved, sweeps of the fallback included.
+    /// Linear systems solved and Gauss-Seidel sweeps done.
     pub(crate) systems: usize,
     /// Rounds of guessing.
     pub(crate) rounds: usize,
@@ -88,7 +81,9 @@ impl ActiveSet {
         }
         while self.modes != self.next_modes {
             if cost.rounds == MAX_ROUNDS {
-                cost.systems += self.sweep_normals(problem, candidates);
+                let (sweeps, residual) = self.sweep(problem, candidates, &[]);
+                cost.systems += sweeps;
+                cost.residual = residual;
                 return Ok(cost);
             }
             self.modes.clone_from(&self.next_modes);
@@ -102,91 +97,23 @@ impl ActiveSet {
         Ok(cost)
     }
 
-    /// Solves for normal forces and friction: after the normals stand two tangents for each candidate
-    /// in `rubbing`, in that order.
+    /// Solves for normal forces and friction, from the normal forces on: after the normals stand two
+    /// tangents for each candidate in `rubbing`, in that order.
     ///
-    /// Sliding contacts feel the friction of the round before (lagged), opposite to their motion.
+    /// Block Gauss-Seidel (nonsmooth contact dynamics, Jean 1999): contact after contact gets the
+    /// force that its own law asks for, given all others. Slower than guessing sets, but Coulomb's
+    /// law is no minimisation, and sets of sticking and sliding contacts cycle.
     pub(crate) fn solve_friction(
         &mut self,
         problem: &Problem,
         candidates: &[Candidate],
         rubbing: &[u32],
-    ) -> Result<SolveCost, FactorError> {
-        let normals = candidates.len();
+    ) -> SolveCost {
         self.forces.resize(problem.rows().len(), 0.0);
-        self.modes.resize(normals, Mode::Off);
-        self.modes.resize(problem.rows().len(), Mode::Stick);
         self.moved.resize(problem.rows().len(), 0.0);
-        let mut cost = SolveCost::default();
-        let mut settled = false;
-        while !settled && cost.rounds < MAX_FRICTION_ROUNDS {
-            cost.residual = self.solve_active(problem, candidates)?;
-            cost.rounds += 1;
-            cost.systems += 1;
-            settled = true;
-            for row in 0..normals {
-                let (mode, _) = normal_law(problem, candidates, row, self.moved[row]);
-                settled &= mode == self.modes[row];
-                self.modes[row] = mode;
-            }
-            for (place, &candidate) in rubbing.iter().enumerate() {
-                let rows = [normals + 2 * place, normals + 2 * place + 1];
-                let slide = cost.rounds <= SLIDING_IS_FINAL;
-                settled &= self.update_tangents(problem, candidates, candidate, rows, slide);
-            }
-        }
-        for (place, &candidate) in rubbing.iter().enumerate() {
-            let rows = [normals + 2 * place, normals + 2 * place + 1];
-            let limit = friction_limit(candidates, &self.forces, candidate);
-            let length = self.forces[rows[0]].hypot(self.forces[rows[1]]);
-            if length > limit {
-                for row in rows {
-                    self.forces[row] *= limit / length;
-                }
-            }
-        }
         self.update_moved(problem);
-        Ok(cost)
-    }
-
-    /// Mode and force of a rubbing contact for the next round; true when both stay.
-    fn update_tangents(
-        &mut self,
-        problem: &Problem,
-        candidates: &[Candidate],
-        candidate: u32,
-        rows: [usize; 2],
-        may_stick: bool,
-    ) -> bool {
-        let limit = friction_limit(candidates, &self.forces, candidate);
-        let force = rows.map(|row| self.forces[row]);
-        let length = force[0].hypot(force[1]);
-        let old = self.modes[rows[0]];
-        let (mode, force) = if limit <= 0.0 {
-            (Mode::Off, [0.0; 2])
-        } else if old == Mode::Stick && length > limit {
-            (Mode::Slide, force.map(|f| f * limit / length))
-        } else if old == Mode::Slide {
-            let slip = rows.map(|row| problem.rows()[row].free + self.moved[row]);
-            let speed = slip[0].hypot(slip[1]);
-            let forward = slip[0] * force[0] + slip[1] * force[1];
-            if forward < 0.0 {
-                (Mode::Slide, slip.map(|s| -s * limit / speed))
-            } else if may_stick {
-                (Mode::Stick, force)
-            } else {
-                (Mode::Slide, force.map(|f| f * (limit / length).min(1.0)))
-            }
-        } else {
-            (Mode::Stick, force)
-        };
-        let mut same = mode == old;
-        for (row, force) in rows.into_iter().zip(force) {
-            same &= (force - self.forces[row]).abs() <= FRICTION_TOLERANCE * limit;
-            self.modes[row] = mode;
-            self.forces[row] = force;
-        }
-        same
+        let (sweeps, residual) = self.sweep(problem, candidates, rubbing);
+        SolveCost { systems: sweeps, rounds: 1, residual }
     }
 
     fn reset(&mut self, count: usize) {
@@ -197,7 +124,7 @@ impl ActiveSet {
         self.moved.resize(count, 0.0);
     }
 
-    /// Solves the equations of the active rows, leaves the sliding forces, and clears all others.
+    /// Solves the equations of the active rows and clears the other forces.
     fn solve_active(
         &mut self,
         problem: &Problem,
@@ -206,9 +133,8 @@ impl ActiveSet {
         self.active.clear();
         for (row, mode) in self.modes.iter().enumerate() {
             match mode {
-                Mode::Elastic | Mode::Recovering | Mode::Stick => self.active.push(row as u32),
+                Mode::Elastic | Mode::Recovering => self.active.push(row as u32),
                 Mode::Off => self.forces[row] = 0.0,
-                Mode::Slide => {}
             }
         }
         let size = self.active.len();
@@ -222,11 +148,7 @@ impl ActiveSet {
                 let place = self.matrix.len() / size;
                 self.matrix.extend(self.active.iter().map(|&col| compliance[col as usize]));
                 self.matrix[place * size + place] += softness;
-                let pushed = compliance.iter().zip(&self.forces).zip(&self.modes);
-                let by_sliding: f64 = pushed
-                    .map(|((w, f), &mode)| if mode == Mode::Slide { w * f } else { 0.0 })
-                    .sum();
-                self.rhs.push(target - by_sliding);
+                self.rhs.push(target);
             }
             self.dense.solve_in_place(&mut self.matrix, &mut self.rhs)?;
             for (&row, &force) in self.active.iter().zip(&self.rhs) {
@@ -255,34 +177,73 @@ impl ActiveSet {
         if scale > 0.0 { worst / scale } else { 0.0 }
     }
 
-    /// Projected Gauss-Seidel on the normals, for the rare case that the guesses cycle.
-    fn sweep_normals(&mut self, problem: &Problem, candidates: &[Candidate]) -> usize {
-        let count = candidates.len();
+    /// Projected Gauss-Seidel until the forces stay; returns the number of sweeps and the last
+    /// change relative to the largest force.
+    fn sweep(
+        &mut self,
+        problem: &Problem,
+        candidates: &[Candidate],
+        rubbing: &[u32],
+    ) -> (usize, f64) {
+        let normals = candidates.len();
+        let mut relative = 0.0;
         for sweep in 1..=MAX_SWEEPS {
             let (mut change, mut largest) = (0.0_f64, 0.0_f64);
-            for row in 0..count {
-                let compliance = problem.compliance_row(row);
-                let all: f64 = compliance.iter().zip(&self.forces).map(|(w, f)| w * f).sum();
-                let others = all - compliance[row] * self.forces[row];
+            let mut rubbing = rubbing.iter().enumerate().peekable();
+            for row in 0..normals {
+                let own = problem.compliance_row(row)[row];
+                let others = self.moved[row] - own * self.forces[row];
                 let force_in = |mode| {
                     let (softness, target) = equation(problem, candidates, row, mode);
-                    (target - others) / (softness + compliance[row])
+                    (target - others) / (softness + own)
                 };
                 let force = force_in(Mode::Elastic).min(force_in(Mode::Recovering)).max(0.0);
-                change = change.max((force - self.forces[row]).abs());
+                change = change.max(self.set_force(problem, row, force));
                 largest = largest.max(force);
-                self.forces[row] = force;
-            }
-            if change <= 1e-9 * largest {
-                self.update_moved(problem);
-                for row in 0..count {
-                    self.modes[row] = normal_law(problem, candidates, row, self.moved[row]).0;
+                if let Some((place, _)) = rubbing.next_if(|&(_, &other)| other as usize == row) {
+                    let tangents = [normals + 2 * place, normals + 2 * place + 1];
+                    let limit = candidates[row].friction * force;
+                    change = change.max(self.rub(problem, tangents, limit));
                 }
-                return sweep;
+            }
+            relative = if largest > 0.0 { change / largest } else { 0.0 };
+            if relative <= SWEEP_TOLERANCE {
+                return (sweep, relative);
             }
         }
-        self.update_moved(problem);
-        MAX_SWEEPS
+        (MAX_SWEEPS, relative)
+    }
+
+    /// Projects a step against the slip onto the disc of the possible friction forces.
+    fn rub(&mut self, problem: &Problem, tangents: [usize; 2], limit: f64) -> f64 {
+        let [first, second] = tangents;
+        let (a, b) = (problem.compliance_row(first)[first], problem.compliance_row(second)[second]);
+        let c = problem.compliance_row(first)[second];
+        // Largest eigenvalue of the contact's own 2x2 block.
+        let stiffest = 0.5 * (a + b) + (0.25 * (a - b) * (a - b) + c * c).sqrt();
+        if stiffest <= 0.0 {
+            return 0.0;
+        }
+        let mut force = tangents
+            .map(|row| self.forces[row] - (problem.rows()[row].free + self.moved[row]) / stiffest);
+        let length = force[0].hypot(force[1]);
+        if length > limit {
+            force = force.map(|f| f * limit / length);
+        }
+        let changes = [0, 1].map(|axis| self.set_force(problem, tangents[axis], force[axis]));
+        changes[0].max(changes[1])
+    }
+
+    /// Changes one force and what it moves; returns the size of the change.
+    fn set_force(&mut self, problem: &Problem, row: usize, force: f64) -> f64 {
+        let change = force - self.forces[row];
+        if change != 0.0 {
+            self.forces[row] = force;
+            for (moved, w) in self.moved.iter_mut().zip(problem.compliance_row(row)) {
+                *moved += change * w;
+            }
+        }
+        change.abs()
     }
 }
 
@@ -290,9 +251,6 @@ impl ActiveSet {
 fn equation(problem: &Problem, candidates: &[Candidate], row: usize, mode: Mode) -> (f64, f64) {
     let floor = SOFTNESS_FLOOR * problem.compliance_row(row)[row];
     let equation = &problem.rows()[row];
-    if mode == Mode::Stick {
-        return (floor, -equation.free);
-    }
     let candidate = &candidates[equation.candidate as usize];
     let (stiffness, goal) = if mode == Mode::Recovering {
         (RECOVERY_STIFFNESS * candidate.stiffness, candidate.recovery)
@@ -316,8 +274,4 @@ fn normal_law(problem: &Problem, candidates: &[Candidate], row: usize, moved: f6
     } else {
         (Mode::Recovering, recovering)
     }
-}
-
-fn friction_limit(candidates: &[Candidate], forces: &[f64], candidate: u32) -> f64 {
-    candidates[candidate as usize].friction * forces[candidate as usize].max(0.0)
 }

@@ -24,6 +24,10 @@ const PASSED_THROUGH: f64 = 4.0;
 /// Time in which the contact distance is recovered where surfaces overlap [s].
 const RECOVERY_TIME: f64 = 0.05;
 
+/// Two contacts of a node are one when their directions and gaps (in contact distances) agree so well.
+const TWIN_COSINE: f64 = 0.9999;
+const TWIN_GAP: f64 = 0.01;
+
 /// A possible contact of this step.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Candidate {
@@ -67,6 +71,8 @@ impl BodyView<'_> {
 pub(crate) struct Filter {
     /// (body, node, other body) of the nodes that are inside another body, sorted.
     inside: Vec<(u32, u32, u32)>,
+    /// (body, node, other body, candidate) of the nodes against triangles, sorted.
+    by_node: Vec<(u32, u32, u32, u32)>,
 }
 
 impl Filter {
@@ -103,6 +109,7 @@ impl Filter {
                 candidates.push(candidate(pair, gap, normal, area, bodies, time_step));
             }
         }
+        self.drop_twins(candidates);
         for node in penetration {
             let bodies = [view(node.body), view(node.into_body)];
             if bodies[0].parameters.rigid && bodies[1].parameters.rigid {
@@ -123,6 +130,32 @@ impl Filter {
             let normal = DVec3::from_array(node.direction);
             candidates.push(candidate(&pair, -node.depth, normal, area, bodies, time_step));
         }
+    }
+
+    /// Keeps one of several contacts of a node with a body in the same direction: straight above an
+    /// edge of a flat surface round-off lets both triangles have it.
+    fn drop_twins(&mut self, candidates: &mut Vec<Candidate>) {
+        self.by_node.clear();
+        for (index, c) in candidates.iter().enumerate() {
+            if c.kind == PairKind::VertexTriangle {
+                self.by_node.push((c.bodies[0], c.nodes[0], c.bodies[1], index as u32));
+            }
+        }
+        self.by_node.sort_unstable();
+        for group in self.by_node.chunk_by(|a, b| (a.0, a.1, a.2) == (b.0, b.1, b.2)) {
+            for (place, &(.., later)) in group.iter().enumerate().skip(1) {
+                let twin = group[..place].iter().any(|&(.., first)| {
+                    let (first, later) = (&candidates[first as usize], &candidates[later as usize]);
+                    first.stiffness > 0.0
+                        && first.normal.dot(later.normal) > TWIN_COSINE
+                        && (first.gap - later.gap).abs() < TWIN_GAP * first.distance
+                });
+                if twin {
+                    candidates[later as usize].stiffness = 0.0;
+                }
+            }
+        }
+        candidates.retain(|candidate| candidate.stiffness > 0.0);
     }
 
     /// Gap and normal of a node against a triangle, if the pair is a contact.

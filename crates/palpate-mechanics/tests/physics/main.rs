@@ -1,0 +1,9 @@
+//! Physics that the mechanics must get right, body by body and in contact.
+
+mod contact;
+mod determinism;
+mod elasticity;
+mod errors;
+mod free_motion;
+mod friction;
+mod world;

@@ -1,0 +1,156 @@
+//! Meshes, models and the step loop that the tests share.
+
+use std::sync::Arc;
+
+use palpate_contact::{IntersectionOptions, Scene, SceneOptions};
+use palpate_geometry::Point;
+use palpate_mechanics::{Dynamics, DynamicsOptions, StepStats};
+use palpate_model::{Body, Material, Mesh, MeshData, Model, RigidMotion, Structure};
+
+pub(crate) const GRAVITY: f64 = 9.81;
+
+/// Six tetrahedra per cell of a box with one corner at the origin; `map` places the nodes.
+pub(crate) fn box_mesh(cells: [u32; 3], size: Point, map: impl Fn(Point) -> Point) -> Arc<Mesh> {
+    let [nx, ny, nz] = cells.map(|n| n + 1);
+    let mut data = MeshData::default();
+    for k in 0..nz {
+        for j in 0..ny {
+            for i in 0..nx {
+                let at = [i, j, k];
+                let node =
+                    std::array::from_fn(|d| size[d] * f64::from(at[d]) / f64::from(cells[d]));
+                data.nodes.push(map(node));
+            }
+        }
+    }
+    for k in 0..cells[2] {
+        for j in 0..cells[1] {
+            for i in 0..cells[0] {
+                let corner = |bits: u32| {
+                    (i + (bits & 1)) + nx * ((j + (bits >> 1 & 1)) + ny * (k + (bits >> 2 & 1)))
+                };
+                for path in [[1, 3], [3, 2], [2, 6], [6, 4], [4, 5], [5, 1]] {
+                    data.tetrahedra.push([0, path[0], path[1], 7].map(corner));
+                }
+            }
+        }
+    }
+    Arc::new(Mesh::new(data).expect("a valid box"))
+}
+
+/// A rectangle of two triangles at height `z`, facing up.
+pub(crate) fn floor(half: f64, z: f64, map: impl Fn(Point) -> Point) -> Arc<Mesh> {
+    let corners = [[-half, -half, z], [half, -half, z], [half, half, z], [-half, half, z]];
+    let data = MeshData {
+        nodes: corners.map(map).to_vec(),
+        triangles: vec![[0, 1, 2], [0, 2, 3]],
+        ..MeshData::default()
+    };
+    Arc::new(Mesh::new(data).expect("a valid floor"))
+}
+
+pub(crate) fn soft(name: &str, mesh: &Arc<Mesh>, young: f64, damping: f64) -> Body {
+    let material = Material { young, poisson: 0.3, damping, ..Material::default() };
+    Body { material, ..Body::new(name, Arc::clone(mesh)) }
+}
+
+pub(crate) fn rigid(name: &str, mesh: &Arc<Mesh>) -> Body {
+    Body { rigid: Some(RigidMotion::default()), ..Body::new(name, Arc::clone(mesh)) }
+}
+
+pub(crate) fn model(bodies: Vec<Body>, gravity: f64) -> Model {
+    let structure = (1..bodies.len()).fold(Structure::Body(0), |left, body| {
+        Structure::Join(Box::new(left), Box::new(Structure::Body(body)))
+    });
+    Model { bodies, structure, gravity: [0.0, 0.0, -gravity] }
+}
+
+/// Dynamics with the contact detection that feeds them.
+pub(crate) struct World {
+    pub(crate) dynamics: Dynamics,
+    scene: Scene,
+}
+
+impl World {
+    pub(crate) fn new(model: &Model, time_step: f64, threads: usize) -> Self {
+        let dynamics = Dynamics::new(model, DynamicsOptions { time_step, threads }).unwrap();
+        let meshes = model.bodies.iter().map(|body| Arc::clone(&body.mesh)).collect();
+        let scene = Scene::new(meshes, Some(&model.structure), SceneOptions::default()).unwrap();
+        Self { dynamics, scene }
+    }
+
+    pub(crate) fn step(&mut self) -> StepStats {
+        let positions: Vec<&[Point]> =
+            (0..self.dynamics.body_count()).map(|body| self.dynamics.positions(body)).collect();
+        self.scene.update(&positions).unwrap();
+        self.dynamics.begin_step();
+        let dynamics = &self.dynamics;
+        let include = |a: usize, b: usize| dynamics.search_distance(a, b).is_some();
+        let penetration = self.scene.penetration(&include).nodes.clone();
+        let pairs = self.scene.proximity(&|a, b| dynamics.search_distance(a, b)).pairs.clone();
+        self.dynamics.finish_step(&pairs, &penetration).unwrap()
+    }
+
+    pub(crate) fn run(&mut self, steps: usize) {
+        for _ in 0..steps {
+            self.step();
+        }
+    }
+
+    /// Number of pairs of surface triangles that intersect.
+    pub(crate) fn intersections(&mut self) -> usize {
+        let positions: Vec<&[Point]> =
+            (0..self.dynamics.body_count()).map(|body| self.dynamics.positions(body)).collect();
+        self.scene.update(&positions).unwrap();
+        self.scene.intersections(&IntersectionOptions::default()).pairs.len()
+    }
+
+    /// Sum of the contact forces on a body [N].
+    pub(crate) fn contact_sum(&self, body: usize) -> Point {
+        sum(self.dynamics.contact_force(body))
+    }
+
+    pub(crate) fn mass(&self, body: usize) -> f64 {
+        self.dynamics.masses(body).unwrap().iter().sum()
+    }
+
+    /// Centre of mass of a body [m].
+    pub(crate) fn center(&self, body: usize) -> Point {
+        let masses = self.dynamics.masses(body).unwrap();
+        let weighted = masses.iter().zip(self.dynamics.positions(body));
+        let moments: Vec<Point> = weighted.map(|(m, x)| x.map(|x| m * x)).collect();
+        sum(&moments).map(|x| x / self.mass(body))
+    }
+}
+
+pub(crate) fn sum(vectors: &[Point]) -> Point {
+    vectors.iter().fold([0.0; 3], |s, v| std::array::from_fn(|k| s[k] + v[k]))
+}
+
+pub(crate) fn length(v: Point) -> f64 {
+    v.iter().map(|x| x * x).sum::<f64>().sqrt()
+}
+
+pub(crate) fn difference(a: Point, b: Point) -> Point {
+    std::array::from_fn(|k| a[k] - b[k])
+}
+
+pub(crate) fn largest_distance(a: &[Point], b: &[Point]) -> f64 {
+    a.iter().zip(b).map(|(&a, &b)| length(difference(a, b))).fold(0.0, f64::max)
+}
+
+/// Volume of a mesh at other positions [m³].
+pub(crate) fn volume(mesh: &Mesh, positions: &[Point]) -> f64 {
+    let six: f64 = mesh
+        .tetrahedra()
+        .iter()
+        .map(|t| {
+            let [a, b, c, d] = t.map(|node| positions[node as usize]);
+            let (u, v, w) = (difference(b, a), difference(c, a), difference(d, a));
+            u[0] * (v[1] * w[2] - v[2] * w[1])
+                + u[1] * (v[2] * w[0] - v[0] * w[2])
+                + u[2] * (v[0] * w[1] - v[1] * w[0])
+        })
+        .sum();
+    six / 6.0
+}
