@@ -132,12 +132,15 @@ impl Dynamics {
             places.push((task as u32, tasks[task].len() as u32));
             tasks[task].push(body);
         }
-        let pool = (options.threads > 1).then(|| {
-            rayon::ThreadPoolBuilder::new()
-                .num_threads(options.threads)
-                .build()
-                .expect("threads can be started")
-        });
+        let pool = match options.threads {
+            0 | 1 => None,
+            threads => Some(
+                rayon::ThreadPoolBuilder::new()
+                    .num_threads(threads)
+                    .build()
+                    .map_err(|error| MechanicsError::Threads(error.to_string()))?,
+            ),
+        };
         Ok(Self {
             options,
             pool,

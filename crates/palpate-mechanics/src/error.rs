@@ -54,6 +54,9 @@ pub enum MechanicsError {
     /// A time step that is not positive and finite.
     #[error("the time step is {0} s; expected a positive number")]
     TimeStep(f64),
+    /// The worker threads could not be started.
+    #[error("cannot start the worker threads: {0}")]
+    Threads(String),
     /// Gravity with an infinite or undefined component.
     #[error("gravity must be finite")]
     Gravity,

@@ -16,16 +16,13 @@ pub(super) fn best_rotation(a: DMat3) -> DMat3 {
     let at = |row: usize, col: usize| b.col(col)[row];
     let z = DVec3::new(at(2, 1) - at(1, 2), at(0, 2) - at(2, 0), at(1, 0) - at(0, 1));
     let trace = at(0, 0) + at(1, 1) + at(2, 2);
-    let mut k = [[0.0; 4]; 4];
-    for i in 0..3 {
-        for j in 0..3 {
-            k[i][j] = at(i, j) + at(j, i);
-        }
-        k[i][i] -= trace;
-        k[i][3] = z[i];
-        k[3][i] = z[i];
-    }
-    k[3][3] = trace;
+    let k = std::array::from_fn(|i| {
+        std::array::from_fn(|j| match (i, j) {
+            (3, 3) => trace,
+            (3, other) | (other, 3) => z[other],
+            _ => at(i, j) + at(j, i) - if i == j { trace } else { 0.0 },
+        })
+    });
     let [x, y, z, w] = dominant_eigenvector(k);
     DMat3::from_quat(DQuat::from_xyzw(x, y, z, w).normalize())
 }
@@ -51,9 +48,9 @@ fn dominant_eigenvector(mut k: [[f64; 4]; 4]) -> [f64; 4] {
                 for row in &mut k {
                     (row[p], row[q]) = (c * row[p] - s * row[q], s * row[p] + c * row[q]);
                 }
-                for i in 0..4 {
-                    (k[p][i], k[q][i]) = (c * k[p][i] - s * k[q][i], s * k[p][i] + c * k[q][i]);
-                }
+                let (first, second) = (k[p], k[q]);
+                k[p] = std::array::from_fn(|i| c * first[i] - s * second[i]);
+                k[q] = std::array::from_fn(|i| s * first[i] + c * second[i]);
                 for row in &mut vectors {
                     (row[p], row[q]) = (c * row[p] - s * row[q], s * row[p] + c * row[q]);
                 }

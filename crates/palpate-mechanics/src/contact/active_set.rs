@@ -141,11 +141,10 @@ impl ActiveSet {
         if size > 0 {
             self.matrix.clear();
             self.rhs.clear();
-            for &row in &self.active {
+            for (place, &row) in self.active.iter().enumerate() {
                 let row = row as usize;
                 let compliance = problem.compliance_row(row);
                 let (softness, target) = equation(problem, candidates, row, self.modes[row]);
-                let place = self.matrix.len() / size;
                 self.matrix.extend(self.active.iter().map(|&col| compliance[col as usize]));
                 self.matrix[place * size + place] += softness;
                 self.rhs.push(target);

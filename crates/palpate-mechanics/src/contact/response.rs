@@ -108,9 +108,9 @@ impl Response {
         for (index, candidate) in self.candidates.iter().enumerate() {
             let mut friction = DVec3::ZERO;
             if let Some((place, _)) = rubbing.next_if(|&(_, &other)| other as usize == index) {
-                for row in normals + 2 * place..normals + 2 * place + 2 {
-                    friction += forces[row] * self.problem.rows()[row].direction;
-                }
+                let first = normals + 2 * place;
+                friction = forces[first] * self.problem.rows()[first].direction
+                    + forces[first + 1] * self.problem.rows()[first + 1].direction;
             }
             if forces[index] <= 0.0 {
                 continue;

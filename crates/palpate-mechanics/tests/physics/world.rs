@@ -5,7 +5,7 @@ use std::sync::Arc;
 use palpate_contact::{IntersectionOptions, Scene, SceneOptions};
 use palpate_geometry::Point;
 use palpate_mechanics::{Dynamics, DynamicsOptions, StepStats};
-use palpate_model::{Body, Material, Mesh, MeshData, Model, RigidMotion, Structure};
+use palpate_model::{Body, Material, Mesh, MeshData, Model, RigidMotion};
 
 pub(crate) const GRAVITY: f64 = 9.81;
 
@@ -59,10 +59,7 @@ pub(crate) fn rigid(name: &str, mesh: &Arc<Mesh>) -> Body {
 }
 
 pub(crate) fn model(bodies: Vec<Body>, gravity: f64) -> Model {
-    let structure = (1..bodies.len()).fold(Structure::Body(0), |left, body| {
-        Structure::Join(Box::new(left), Box::new(Structure::Body(body)))
-    });
-    Model { bodies, structure, gravity: [0.0, 0.0, -gravity] }
+    Model { gravity: [0.0, 0.0, -gravity], ..Model::from_bodies(bodies) }
 }
 
 /// Dynamics with the contact detection that feeds them.
