@@ -12,6 +12,7 @@
 use faer::linalg::triangular_solve;
 use faer::sparse::linalg::cholesky::supernodal::SupernodalLltRef;
 use faer::{Mat, Par};
+use pulp::Simd;
 
 /// Rows of a panel: what fits in the vector registers together with three right-hand sides.
 const ROWS: usize = 16;
@@ -133,13 +134,7 @@ impl PackedFactor {
         for (x, &node) in work.x.as_chunks_mut::<3>().0.iter_mut().zip(order) {
             *x = rhs[node as usize];
         }
-        pulp::Arch::new().dispatch(
-            #[inline(always)]
-            || {
-                self.forward::<1>(work, 0);
-                self.backward::<1>(work);
-            },
-        );
+        pulp::Arch::new().dispatch(Passes::<1> { factor: self, work, first: 0 });
         for (x, &node) in work.x.as_chunks::<3>().0.iter().zip(order) {
             rhs[node as usize] = *x;
         }
@@ -162,13 +157,7 @@ impl PackedFactor {
         for axis in 0..3 {
             work.x[3 * (3 * place + axis) + axis] = 1.0;
         }
-        pulp::Arch::new().dispatch(
-            #[inline(always)]
-            || {
-                self.forward::<3>(work, 3 * place);
-                self.backward::<3>(work);
-            },
-        );
+        pulp::Arch::new().dispatch(Passes::<3> { factor: self, work, first: 3 * place });
         for (x, &node) in work.x.as_chunks::<9>().0.iter().zip(order) {
             columns[node as usize] = std::array::from_fn(|entry| x[3 * (entry % 3) + entry / 3]);
         }
@@ -177,7 +166,7 @@ impl PackedFactor {
     /// Columns before `first` of the right-hand sides are zero.
     #[allow(clippy::inline_always)] // compiled for the vector unit that `dispatch` found
     #[inline(always)]
-    fn forward<const K: usize>(&self, work: &mut SolveWorkspace, first: usize) {
+    fn forward<S: Simd, const K: usize>(&self, simd: S, work: &mut SolveWorkspace, first: usize) {
         let x = work.x.as_chunks_mut::<K>().0;
         let begin = self.supernodes.partition_point(|node| node.columns().end <= first);
         for supernode in &self.supernodes[begin..] {
@@ -192,14 +181,7 @@ impl PackedFactor {
             for first in (0..supernode.row_count()).step_by(ROWS) {
                 let (panel, rest) = panels.split_at(width.min(first + ROWS));
                 panels = rest;
-                let mut sums = [[0.0; ROWS]; K];
-                for (column, factor) in panel.iter().zip(&*top) {
-                    for k in 0..K {
-                        for lane in 0..ROWS {
-                            sums[k][lane] += column[lane] * factor[k];
-                        }
-                    }
-                }
+                let sums = panel_product::<S, K>(simd, panel, top);
                 for (lane, row) in rows[first..first + ROWS].iter_mut().enumerate() {
                     for k in 0..K {
                         row[k] = sums[k][lane];
@@ -218,7 +200,7 @@ impl PackedFactor {
 
     #[allow(clippy::inline_always)] // as `forward`
     #[inline(always)]
-    fn backward<const K: usize>(&self, work: &mut SolveWorkspace) {
+    fn backward<S: Simd, const K: usize>(&self, simd: S, work: &mut SolveWorkspace) {
         let x = work.x.as_chunks_mut::<K>().0;
         for supernode in self.supernodes.iter().rev() {
             let width = supernode.width as usize;
@@ -244,19 +226,85 @@ impl PackedFactor {
                         values[k][lane] = row[k];
                     }
                 }
-                for (column, sums) in panel.iter().zip(sums.as_chunks_mut::<K>().0) {
-                    for k in 0..K {
-                        for lane in 0..LANES {
-                            sums[k][lane] += column[lane] * values[k][lane]
-                                + column[lane + LANES] * values[k][lane + LANES];
-                        }
-                    }
-                }
+                add_transposed_product::<S, K>(simd, panel, &values, sums.as_chunks_mut::<K>().0);
             }
             for (value, sums) in x[supernode.columns()].iter_mut().zip(sums.as_chunks::<K>().0) {
                 for k in 0..K {
                     value[k] = sums[k].iter().sum();
                 }
+            }
+        }
+    }
+}
+
+/// Both passes of a solve, for the vector unit that the machine has.
+struct Passes<'a, const K: usize> {
+    factor: &'a PackedFactor,
+    work: &'a mut SolveWorkspace,
+    /// Columns before this one of the right-hand sides are zero.
+    first: usize,
+}
+
+impl<const K: usize> pulp::WithSimd for Passes<'_, K> {
+    type Output = ();
+
+    #[allow(clippy::inline_always)] // as `forward`
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        self.factor.forward::<S, K>(simd, self.work, self.first);
+        self.factor.backward::<S, K>(simd, self.work);
+    }
+}
+
+/// Vectors that are summed at once: enough chains to hide the latency, few enough registers.
+const GROUP: usize = 2;
+
+/// `panel * top` for the rows of one panel.
+#[allow(clippy::inline_always)] // as `forward`
+#[inline(always)]
+fn panel_product<S: Simd, const K: usize>(
+    simd: S,
+    panel: &[Panel],
+    top: &[[f64; K]],
+) -> [[f64; ROWS]; K] {
+    let mut result = [[0.0; ROWS]; K];
+    for group in 0..ROWS / S::F64_LANES / GROUP {
+        let mut sums = [[simd.splat_f64s(0.0); GROUP]; K];
+        for (column, factor) in panel.iter().zip(top) {
+            let column = &S::as_simd_f64s(column).0[group * GROUP..][..GROUP];
+            for k in 0..K {
+                let factor = simd.splat_f64s(factor[k]);
+                for i in 0..GROUP {
+                    sums[k][i] = simd.mul_add_f64s(column[i], factor, sums[k][i]);
+                }
+            }
+        }
+        for k in 0..K {
+            let result = S::as_mut_simd_f64s(&mut result[k]).0;
+            result[group * GROUP..][..GROUP].copy_from_slice(&sums[k]);
+        }
+    }
+    result
+}
+
+/// Adds `panel^T * values` to the running sums of each column.
+#[allow(clippy::inline_always)] // as `forward`
+#[inline(always)]
+fn add_transposed_product<S: Simd, const K: usize>(
+    simd: S,
+    panel: &[Panel],
+    values: &[[f64; ROWS]; K],
+    sums: &mut [[[f64; LANES]; K]],
+) {
+    let per_sum = LANES / S::F64_LANES;
+    for (column, sums) in panel.iter().zip(sums) {
+        let column = S::as_simd_f64s(column).0;
+        for (sums, values) in sums.iter_mut().zip(values) {
+            let sums = S::as_mut_simd_f64s(sums).0;
+            let values = S::as_simd_f64s(values).0;
+            for i in 0..per_sum {
+                let half = simd.mul_add_f64s(column[i], values[i], sums[i]);
+                sums[i] = simd.mul_add_f64s(column[i + per_sum], values[i + per_sum], half);
             }
         }
     }
