@@ -104,29 +104,43 @@ impl MovingBody {
         }
     }
 
-    /// Moves the body as if alone; `surface` are its surface nodes, `end` the time after the step.
-    pub(crate) fn predict(&mut self, surface: &[u32], end: f64) {
-        let deformation = match &mut self.kind {
+    /// Moves the body as if alone; `surface` are its surface nodes, `end` the time after the step [s].
+    pub(crate) fn predict(&mut self, surface: &[u32], end: f64, time_step: f64) {
+        match &mut self.kind {
             BodyKind::Elastic(elastic) => {
                 elastic.predict(&self.positions, &self.velocities, &self.forces);
                 elastic.free_positions(&mut self.free_positions);
-                elastic.largest_deformation(surface)
             }
             BodyKind::Rigid { rest, motion } => {
                 let pose = motion.pose(end);
                 for (node, &rest) in self.free_positions.iter_mut().zip(&*rest) {
                     *node = pose.apply(rest);
                 }
-                0.0
             }
-        };
+        }
+        self.motion = self.expected_motion(surface, time_step);
+    }
+
+    /// Motion by inertia and gravity: what contact forces held at rest will go on being held, so the
+    /// free motion would look for contacts much too far away.
+    fn expected_motion(&self, surface: &[u32], time_step: f64) -> Motion {
         let displacement = |&node: &u32| {
-            DVec3::from_array(self.free_positions[node as usize])
-                - DVec3::from_array(self.positions[node as usize])
+            let position = self.positions[node as usize];
+            match &self.kind {
+                BodyKind::Elastic(elastic) => elastic.inertial_displacement(node, position),
+                BodyKind::Rigid { .. } => {
+                    DVec3::from_array(self.free_positions[node as usize])
+                        - DVec3::from_array(position)
+                }
+            }
         };
         let mean = surface.iter().map(displacement).sum::<DVec3>() / surface.len().max(1) as f64;
         let spread = surface.iter().map(|node| (displacement(node) - mean).length());
-        self.motion = Motion { mean, spread: spread.fold(0.0, f64::max), deformation };
+        let deformation = self.elastic().map_or(0.0, |elastic| {
+            let speeds = surface.iter().map(|&node| elastic.deformation_speed(node));
+            time_step * speeds.fold(0.0, f64::max)
+        });
+        Motion { mean, spread: spread.fold(0.0, f64::max), deformation }
     }
 
     /// Makes the compliance columns of `nodes` available.
@@ -141,9 +155,7 @@ impl MovingBody {
     pub(crate) fn advance(&mut self, time_step: f64) {
         match &mut self.kind {
             BodyKind::Elastic(elastic) => {
-                if self.touched {
-                    elastic.respond(&self.contact_forces);
-                }
+                elastic.respond(self.touched.then_some(&self.contact_forces));
                 elastic.advance(
                     &self.positions,
                     &self.forces,

@@ -20,6 +20,9 @@ use crate::state::{BodyState, State};
 /// ahead are found in a later step, or as penetrations.
 const MARGIN_LIMIT: f64 = 3.0;
 
+/// Passes of a step: a contact that only the forces of others bring about is found by the next one.
+const MAX_PASSES: usize = 4;
+
 /// How the bodies are stepped.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DynamicsOptions {
@@ -193,9 +196,10 @@ impl Dynamics {
     pub fn begin_step(&mut self) {
         let start = Instant::now();
         let end = self.time_at(self.step + 1);
+        let time_step = self.options.time_step;
         let surfaces = std::mem::take(&mut self.surfaces);
         self.for_each_body(|index, body| {
-            body.predict(surfaces[index].mesh().surface_nodes(), end);
+            body.predict(surfaces[index].mesh().surface_nodes(), end, time_step);
         });
         self.surfaces = surfaces;
         self.predict_time = start.elapsed();
@@ -266,28 +270,23 @@ impl Dynamics {
                 positions: &self.body(body).positions,
             },
         );
-        stats.candidates = response.candidate_count();
         stats.times.filter = start.elapsed();
 
-        let start = Instant::now();
-        let step = self.step;
-        let problem = response.problem();
-        self.for_each_body(|index, body| body.prepare_compliance(problem.nodes(index), step));
-        stats.new_columns = (0..self.body_count()).map(|body| self.body(body).new_columns).sum();
-        stats.times.compliance = start.elapsed();
-
-        let start = Instant::now();
-        let cost = response.solve(|body| self.body(body)).map_err(MechanicsError::Contact)?;
-        (stats.iterations, stats.newton_iterations) = (cost.systems, cost.rounds);
-        stats.residual = cost.residual;
+        for _ in 0..MAX_PASSES {
+            self.solve_contacts(response, &mut stats)?;
+            let start = Instant::now();
+            self.apply_contact_forces(response.contacts());
+            self.for_each_body(|_, body| body.advance(time_step));
+            let missed = response.take_missed(self.body_count(), |body| self.body(body));
+            stats.times.advance += start.elapsed();
+            if !missed {
+                break;
+            }
+        }
+        stats.candidates = response.candidate_count();
         stats.contacts = response.contacts().len();
         stats.self_contacts =
             response.contacts().iter().filter(|c| c.bodies[0] == c.bodies[1]).count();
-        stats.times.solve = start.elapsed();
-
-        let start = Instant::now();
-        self.apply_contact_forces(response.contacts());
-        self.for_each_body(|_, body| body.advance(time_step));
         for index in 0..self.body_count() {
             if let Some(node) = self.body(index).first_broken_node() {
                 let what = "the state after the step";
@@ -296,8 +295,30 @@ impl Dynamics {
         }
         self.for_each_body(|_, body| body.commit());
         self.step += 1;
-        stats.times.advance = start.elapsed();
         Ok(stats)
+    }
+
+    /// One solve for the contact forces of the candidates.
+    fn solve_contacts(
+        &mut self,
+        response: &mut Response,
+        stats: &mut StepStats,
+    ) -> Result<(), MechanicsError> {
+        let start = Instant::now();
+        let step = self.step;
+        let problem = response.problem();
+        self.for_each_body(|index, body| body.prepare_compliance(problem.nodes(index), step));
+        stats.new_columns +=
+            (0..self.body_count()).map(|body| self.body(body).new_columns).sum::<usize>();
+        stats.times.compliance += start.elapsed();
+
+        let start = Instant::now();
+        let cost = response.solve(|body| self.body(body)).map_err(MechanicsError::Contact)?;
+        stats.iterations += cost.systems;
+        stats.newton_iterations += cost.rounds;
+        stats.residual = cost.residual;
+        stats.times.solve += start.elapsed();
+        Ok(())
     }
 
     fn apply_contact_forces(&mut self, contacts: &[Contact]) {

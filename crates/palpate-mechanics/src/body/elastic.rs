@@ -51,7 +51,8 @@ struct Step {
     force: Vec<[f64; 3]>,
     /// Correction of the free nodes in the frame [m].
     correction: Vec<[f64; 3]>,
-    rhs: Vec<[f64; 3]>,
+    /// Response of the free nodes to contact forces in the frame [m].
+    response: Vec<[f64; 3]>,
     columns: Vec<[f64; 9]>,
     workspace: SolveWorkspace,
 }
@@ -116,7 +117,7 @@ impl ElasticBody {
             strain: vec![[0.0; 3]; count],
             force: vec![[0.0; 3]; count],
             correction: vec![[0.0; 3]; free_nodes.len()],
-            rhs: vec![[0.0; 3]; free_nodes.len()],
+            response: vec![[0.0; 3]; free_nodes.len()],
             columns: vec![[0.0; 9]; free_nodes.len()],
             workspace: factor.workspace(),
         };
@@ -303,21 +304,19 @@ impl ElasticBody {
         }
     }
 
-    /// Largest displacement in this step that is not rigid, over `surface` nodes [m].
-    pub(super) fn largest_deformation(&self, surface: &[u32]) -> f64 {
-        let count = self.free_nodes.len().max(1) as f64;
-        let mean: DVec3 =
-            self.step.correction.iter().map(|&d| DVec3::from_array(d)).sum::<DVec3>() / count;
-        let moved = surface.iter().map(|&node| {
-            let place = self.free_index[node as usize];
-            let d = if place == FIXED {
-                DVec3::ZERO
-            } else {
-                DVec3::from_array(self.step.correction[place as usize])
-            };
-            (self.time_step * self.step.deformation[node as usize] + d - mean).length()
-        });
-        moved.fold(0.0, f64::max)
+    /// Displacement of a node in this step by inertia and gravity [m].
+    pub(super) fn inertial_displacement(&self, node: u32, position: Point) -> DVec3 {
+        let node = node as usize;
+        if self.free_index[node] == FIXED {
+            return DVec3::ZERO;
+        }
+        self.step.positions[node] - DVec3::from_array(position)
+            + self.time_step * self.time_step * self.gravity
+    }
+
+    /// Speed of the deformation at a node [m/s].
+    pub(super) fn deformation_speed(&self, node: u32) -> f64 {
+        self.step.deformation[node as usize].length()
     }
 
     /// Solves for the three unit forces on `node`, which must be free; read the result with
@@ -339,18 +338,17 @@ impl ElasticBody {
         (place != FIXED).then_some(place as usize)
     }
 
-    /// Adds the response to contact forces [N] to the correction.
-    pub(super) fn respond(&mut self, forces: &[Point]) {
+    /// Solves for the response to contact forces [N]; without any it is zero.
+    pub(super) fn respond(&mut self, forces: Option<&[Point]>) {
+        let Some(forces) = forces else {
+            self.step.response.fill([0.0; 3]);
+            return;
+        };
         let to_frame = self.step.frame.transpose();
-        for (rhs, &node) in self.step.rhs.iter_mut().zip(&self.free_nodes) {
-            *rhs = (to_frame * DVec3::from_array(forces[node as usize])).to_array();
+        for (load, &node) in self.step.response.iter_mut().zip(&self.free_nodes) {
+            *load = (to_frame * DVec3::from_array(forces[node as usize])).to_array();
         }
-        self.factor.solve_in_place(&mut self.step.rhs, &mut self.step.workspace);
-        for (d, more) in self.step.correction.iter_mut().zip(&self.step.rhs) {
-            for k in 0..3 {
-                d[k] += more[k];
-            }
-        }
+        self.factor.solve_in_place(&mut self.step.response, &mut self.step.workspace);
     }
 
     /// The state after the step.
@@ -364,9 +362,10 @@ impl ElasticBody {
     ) {
         next_x.copy_from_slice(x);
         next_v.fill([0.0; 3]);
-        for (&node, &d) in self.free_nodes.iter().zip(&self.step.correction) {
+        let corrections = self.step.correction.iter().zip(&self.step.response);
+        for (&node, (&d, &response)) in self.free_nodes.iter().zip(corrections) {
             let node = node as usize;
-            let d = self.step.frame * DVec3::from_array(d);
+            let d = self.step.frame * (DVec3::from_array(d) + DVec3::from_array(response));
             next_x[node] = (self.step.positions[node] + d).to_array();
             next_v[node] = (self.step.velocities[node] + d / self.time_step).to_array();
         }
@@ -389,27 +388,17 @@ impl ElasticBody {
         (start.spin + self.time_step * torque) / (1.0 + self.mass_damping * self.time_step)
     }
 
-    /// The linear step conserves angular momentum to first order in dt; the rest is put right by a
-    /// rigid rotation: of positions and velocities first, then of the velocities alone, to round-off.
-    fn correct_spin(&self, target: DVec3, x: &mut [Point], v: &mut [Point]) {
-        for rotate in [true, false] {
-            let now = Inertia::new(&self.masses, x, v);
-            let omega = now.tensor.inverse() * (target - now.spin);
-            if !omega.is_finite() {
-                return;
-            }
-            let turn = if rotate {
-                DMat3::from_quat(DQuat::from_scaled_axis(self.time_step * omega))
-            } else {
-                DMat3::IDENTITY
-            };
-            for (x, v) in x.iter_mut().zip(v.iter_mut()) {
-                let r = DVec3::from_array(*x) - now.center;
-                *v = (DVec3::from_array(*v) + omega.cross(r)).to_array();
-                if rotate {
-                    *x = (now.center + turn * r).to_array();
-                }
-            }
+    /// The response to contact turns the body by an amount of second order too much; positions stay,
+    /// or surfaces would overlap, and the velocities are put right, to round-off.
+    fn correct_spin(&self, target: DVec3, x: &[Point], v: &mut [Point]) {
+        let now = Inertia::new(&self.masses, x, v);
+        let omega = now.tensor.inverse() * (target - now.spin);
+        if !omega.is_finite() {
+            return;
+        }
+        for (v, &x) in v.iter_mut().zip(x) {
+            let r = DVec3::from_array(x) - now.center;
+            *v = (DVec3::from_array(*v) + omega.cross(r)).to_array();
         }
     }
 

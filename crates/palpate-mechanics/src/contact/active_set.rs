@@ -9,11 +9,14 @@ use super::filter::Candidate;
 use super::problem::Problem;
 
 /// Rounds of the Newton iteration before the fallback.
-const MAX_ROUNDS: usize = 30;
+const MAX_ROUNDS: usize = 12;
 /// Sweeps of Gauss-Seidel.
 const MAX_SWEEPS: usize = 1_000;
-/// A contact that is limited in its recovery is this many times stiffer than the penalty.
-const RECOVERY_STIFFNESS: f64 = 100.0;
+/// Part of the contact distance in which the penalty is soft. Below it, and where the recovery is
+/// limited, a contact is [`HARDENING`] times stiffer: surfaces must not pass through each other even
+/// where all the load is on a few nodes, since an open surface would then push the wrong way.
+const SOFT_PART: f64 = 0.5;
+const HARDENING: f64 = 100.0;
 /// Smallest softness of an equation relative to its own compliance: keeps the matrix regular.
 const SOFTNESS_FLOOR: f64 = 1e-6;
 /// Sweeps end when no force changes by more than this part of the largest one.
@@ -24,6 +27,8 @@ enum Mode {
     Off,
     /// Penalty force by the overlap.
     Elastic,
+    /// The steeper penalty of a deep overlap.
+    Hard,
     /// As hard as it takes to reach the recovery gap, which is less than the penalty.
     Recovering,
 }
@@ -133,7 +138,7 @@ impl ActiveSet {
         self.active.clear();
         for (row, mode) in self.modes.iter().enumerate() {
             match mode {
-                Mode::Elastic | Mode::Recovering => self.active.push(row as u32),
+                Mode::Elastic | Mode::Hard | Mode::Recovering => self.active.push(row as u32),
                 Mode::Off => self.forces[row] = 0.0,
             }
         }
@@ -196,7 +201,8 @@ impl ActiveSet {
                     let (softness, target) = equation(problem, candidates, row, mode);
                     (target - others) / (softness + own)
                 };
-                let force = force_in(Mode::Elastic).min(force_in(Mode::Recovering)).max(0.0);
+                let penalty = force_in(Mode::Elastic).max(force_in(Mode::Hard));
+                let force = penalty.min(force_in(Mode::Recovering)).max(0.0);
                 change = change.max(self.set_force(problem, row, force));
                 largest = largest.max(force);
                 if let Some((place, _)) = rubbing.next_if(|&(_, &other)| other as usize == row) {
@@ -251,10 +257,13 @@ fn equation(problem: &Problem, candidates: &[Candidate], row: usize, mode: Mode)
     let floor = SOFTNESS_FLOOR * problem.compliance_row(row)[row];
     let equation = &problem.rows()[row];
     let candidate = &candidates[equation.candidate as usize];
-    let (stiffness, goal) = if mode == Mode::Recovering {
-        (RECOVERY_STIFFNESS * candidate.stiffness, candidate.recovery)
-    } else {
-        (candidate.stiffness, candidate.distance)
+    let hard = HARDENING * candidate.stiffness;
+    let soft_part = SOFT_PART * candidate.distance;
+    let (stiffness, goal) = match mode {
+        Mode::Recovering => (hard, candidate.recovery),
+        // Continues the soft law from the end of the soft part on.
+        Mode::Hard => (hard, candidate.distance - soft_part + soft_part / HARDENING),
+        Mode::Elastic | Mode::Off => (candidate.stiffness, candidate.distance),
     };
     (stiffness.recip().max(floor), goal - (candidate.gap + equation.free))
 }
@@ -265,12 +274,13 @@ fn normal_law(problem: &Problem, candidates: &[Candidate], row: usize, moved: f6
         let (softness, target) = equation(problem, candidates, row, mode);
         (target - moved) / softness
     };
-    let (elastic, recovering) = (force_in(Mode::Elastic), force_in(Mode::Recovering));
-    if elastic.min(recovering) <= 0.0 {
-        (Mode::Off, 0.0)
-    } else if elastic <= recovering {
-        (Mode::Elastic, elastic)
-    } else {
-        (Mode::Recovering, recovering)
+    let mut best = (Mode::Elastic, force_in(Mode::Elastic));
+    let (hard, recovering) = (force_in(Mode::Hard), force_in(Mode::Recovering));
+    if hard > best.1 {
+        best = (Mode::Hard, hard);
     }
+    if recovering < best.1 {
+        best = (Mode::Recovering, recovering);
+    }
+    if best.1 > 0.0 { best } else { (Mode::Off, 0.0) }
 }

@@ -216,7 +216,18 @@ impl Filter {
         }
         let faces_away = own.surface.is_closed()
             && own.surface.node_normal(node, own.positions).dot(normal) > FACING_LIMIT;
-        (!faces_away).then_some((gap, normal))
+        if !faces_away {
+            return Some((gap, normal));
+        }
+        // The node of a closed body has slipped through an open surface when an edge from it
+        // crosses back: it is pulled out again. Otherwise it only sees that surface through its body.
+        let through = !other.surface.is_closed()
+            && own
+                .surface
+                .node_neighbours(node)
+                .iter()
+                .any(|&neighbour| (own.at(neighbour) - own.at(node)).dot(normal) < -gap);
+        through.then_some((-gap, -normal))
     }
 }
 

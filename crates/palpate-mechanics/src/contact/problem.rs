@@ -195,12 +195,29 @@ pub(crate) fn free_displacement<'a>(
     candidate: &Candidate,
     body: impl Fn(usize) -> &'a MovingBody,
 ) -> DVec3 {
+    displacement_to(candidate, body, |body| &body.free_positions)
+}
+
+/// Relative displacement of the two sides in the step as it was computed last [m].
+pub(crate) fn step_displacement<'a>(
+    candidate: &Candidate,
+    body: impl Fn(usize) -> &'a MovingBody,
+) -> DVec3 {
+    displacement_to(candidate, body, |body| &body.next_positions)
+}
+
+fn displacement_to<'a>(
+    candidate: &Candidate,
+    body: impl Fn(usize) -> &'a MovingBody,
+    end: impl Fn(&'a MovingBody) -> &'a [Point],
+) -> DVec3 {
     let mut sum = DVec3::ZERO;
     for corner in 0..4 {
         let moving = body(candidate.bodies[side(candidate.kind, corner)] as usize);
         let node = candidate.nodes[corner] as usize;
-        let at = |positions: &[Point]| DVec3::from_array(positions[node]);
-        sum += candidate.weights[corner] * (at(&moving.free_positions) - at(&moving.positions));
+        let moved =
+            DVec3::from_array(end(moving)[node]) - DVec3::from_array(moving.positions[node]);
+        sum += candidate.weights[corner] * moved;
     }
     sum
 }

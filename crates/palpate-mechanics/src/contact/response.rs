@@ -7,15 +7,22 @@ use palpate_solver::FactorError;
 use super::Contact;
 use super::active_set::{ActiveSet, SolveCost};
 use super::filter::{BodyView, Candidate, Filter};
-use super::problem::{Problem, free_displacement};
+use super::problem::{Problem, free_displacement, step_displacement};
 use super::side;
 use crate::body::MovingBody;
+
+/// A pair counts when free motion brings it closer than this, in contact distances.
+const CLOSE: f64 = 1.5;
+/// A pair that did not count was missed when it ends up closer than this, in contact distances.
+const MISSED: f64 = 0.75;
 
 /// Contact detection to contact forces. Keeps its memory.
 #[derive(Default)]
 pub(crate) struct Response {
     filter: Filter,
     candidates: Vec<Candidate>,
+    /// Pairs that free motion does not bring close enough to count.
+    spare: Vec<Candidate>,
     problem: Problem,
     active_set: ActiveSet,
     /// Candidates with friction that push.
@@ -36,13 +43,43 @@ impl Response {
     ) {
         let view = |body: u32| view(body as usize);
         self.filter.run(proximity, penetration, view, time_step, &mut self.candidates);
-        // Half a contact distance of slack: a contact force on one node may push another closer.
+        self.spare.clear();
+        let spare = &mut self.spare;
         self.candidates.retain(|candidate| {
             let moved = candidate.normal.dot(free_displacement(candidate, &body));
-            candidate.gap.min(candidate.gap + moved) < 1.5 * candidate.distance
+            let close = candidate.gap.min(candidate.gap + moved) < CLOSE * candidate.distance;
+            if !close {
+                spare.push(*candidate);
+            }
+            close
         });
         self.problem.collect(&self.candidates, body_count, &body);
         self.contacts.clear();
+    }
+
+    /// Takes in the pairs that the step brought together although free motion did not; true if
+    /// there are any, so that the forces must be solved again.
+    pub(crate) fn take_missed<'a>(
+        &mut self,
+        body_count: usize,
+        body: impl Fn(usize) -> &'a MovingBody,
+    ) -> bool {
+        let known = self.candidates.len();
+        let candidates = &mut self.candidates;
+        self.spare.retain(|candidate| {
+            let moved = candidate.normal.dot(step_displacement(candidate, &body));
+            let missed = candidate.gap + moved < MISSED * candidate.distance;
+            if missed {
+                candidates.push(*candidate);
+            }
+            !missed
+        });
+        if self.candidates.len() == known {
+            return false;
+        }
+        self.problem.collect(&self.candidates, body_count, &body);
+        self.contacts.clear();
+        true
     }
 
     pub(crate) fn candidate_count(&self) -> usize {

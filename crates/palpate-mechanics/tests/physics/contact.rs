@@ -106,7 +106,7 @@ fn overlapping_bodies_separate_gently() {
             left_of_right > right_of_left,
             "overlap {overlap}: {left_of_right} {right_of_left}"
         );
-        assert!(fastest < 0.15, "overlap {overlap}: {fastest} m/s");
+        assert!(fastest < 0.2, "overlap {overlap}: {fastest} m/s");
     }
 }
 
@@ -168,4 +168,24 @@ fn a_bent_strip_touches_itself_and_is_held_apart() {
     assert!(most > 5, "{most} self-contacts");
     assert!(length(world.contact_sum(0)) < 1e-12);
     assert_eq!(world.intersections(), 0, "the arms have passed through each other");
+}
+
+#[test]
+fn a_node_that_slipped_through_an_open_floor_comes_back() {
+    let dented = |[x, y, z]: [f64; 3]| {
+        let sag = if (x - 0.05).abs() < 1e-9 && (y - 0.05).abs() < 1e-9 && z == 0.0 {
+            0.006
+        } else {
+            0.0
+        };
+        [x, y, z + 0.002 - sag]
+    };
+    let mesh = box_mesh([4, 4, 3], [0.1, 0.1, 0.06], dented);
+    let bodies = vec![rigid("floor", &floor(0.3, 0.0, |x| x)), soft("block", &mesh, 1e4, 0.02)];
+    let mut world = World::new(&model(bodies, GRAVITY), DT, 1);
+    world.run(90);
+    let lowest = world.dynamics.positions(1).iter().map(|x| x[2]).fold(f64::MAX, f64::min);
+    assert!(lowest > 0.0, "a node hangs at {lowest}");
+    let weight = world.mass(1) * GRAVITY;
+    assert!((world.contact_sum(1)[2] / weight - 1.0).abs() < 0.02);
 }
