@@ -17,7 +17,7 @@ use palpate_geometry::{Aabb, triangles_intersect, vec3};
 use palpate_model::{Mesh, ReadOptions, read_mesh};
 use parry3d_f64::bounding_volume::Aabb as ParryAabb;
 use parry3d_f64::math::Vector;
-use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy, BvhWorkspace};
+use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy, BvhNode, BvhWorkspace};
 use scenes::{Point, Positions, as_slices, horseshoe, positions};
 
 const FRAMES: usize = 40;
@@ -95,23 +95,19 @@ impl Parry {
     }
 
     /// Candidates of self and inter contact that share no node.
-    fn candidates(&self, meshes: &[Arc<Mesh>], found: &mut Vec<[u32; 4]>) {
+    fn candidates(&mut self, meshes: &[Arc<Mesh>], found: &mut Vec<[u32; 4]>) {
         found.clear();
-        for a in 0..self.trees.len() {
-            let triangles = meshes[a].triangles();
-            for (i, j) in self.trees[a].leaf_pairs(&self.trees[a], |x, y| {
-                x.aabb().mins.cmple(y.aabb().maxs).all() && y.aabb().mins.cmple(x.aabb().maxs).all()
-            }) {
-                let share = triangles[i as usize].iter().any(|n| triangles[j as usize].contains(n));
-                if i < j && !share {
+        let Self { trees, workspace } = self;
+        for (a, (tree, mesh)) in trees.iter().zip(meshes).enumerate() {
+            let triangles = mesh.triangles();
+            tree.traverse_bvtt_single_tree::<false>(workspace, &mut |i, j| {
+                let [p, q] = [triangles[i as usize], triangles[j as usize]];
+                if !p.iter().any(|node| q.contains(node)) {
                     found.push([a as u32, i, a as u32, j]);
                 }
-            }
-            for b in a + 1..self.trees.len() {
-                for (i, j) in self.trees[a].leaf_pairs(&self.trees[b], |x, y| {
-                    x.aabb().mins.cmple(y.aabb().maxs).all()
-                        && y.aabb().mins.cmple(x.aabb().maxs).all()
-                }) {
+            });
+            for (b, other) in trees.iter().enumerate().skip(a + 1) {
+                for (i, j) in tree.leaf_pairs(other, BvhNode::intersects) {
                     found.push([a as u32, i, b as u32, j]);
                 }
             }

@@ -10,6 +10,7 @@
 mod adjacency;
 mod boxes;
 mod features;
+mod hierarchy;
 mod order;
 mod separation;
 #[cfg(test)]
@@ -23,67 +24,68 @@ use palpate_model::Mesh;
 use palpate_model::mesh::NONE;
 
 use crate::simd::Isa;
-pub(crate) use adjacency::{Adjacency, bits, owned_pairs};
-use boxes::Block;
+use adjacency::Adjacency;
 pub(crate) use features::{EdgePairs, VertexPairs};
+pub(crate) use hierarchy::Hierarchy;
 pub(crate) use separation::{Reach, SeparateTriangles};
 pub(crate) use traverse::{Sides, Traversal};
 
-/// Triangles of a block, and children of a block of the hierarchy.
+/// Elements of a block, and children of a block of the hierarchy.
 pub(crate) const WIDTH: usize = 8;
 
 /// One body in the wide layout.
+///
+/// Intersections are found among the triangles, close pairs among the edges and between nodes and
+/// triangles: each pair of features is met once.
 #[derive(Debug)]
 pub(crate) struct WideBody {
     mesh: Arc<Mesh>,
-    /// Surface nodes, in the order in which the triangles meet them, as nodes of the mesh.
+    /// Surface nodes in the order of `points`, as nodes of the mesh.
     surface_nodes: Vec<u32>,
     /// Positions of the surface nodes less the frame's origin; the fourth number is padding.
     nodes: Vec<[f32; 4]>,
-    /// Per slot: three indices into `nodes`, and the triangle of the mesh ([`NONE`] in a pad).
-    slots: Vec<[u32; 4]>,
-    /// Per slot: bit i set when the triangle owns its node i, bit 3 + i its edge i (ab, bc, ca).
-    owned: Vec<u8>,
-    /// `levels[0]`: boxes of the triangles; `levels[k]`: boxes of the blocks of level k - 1. The last
-    /// has one block.
-    levels: Vec<Vec<Block>>,
-    /// A level above the last: the whole body in lane 0.
-    above: Block,
-    adjacency: Adjacency,
+    pub(crate) triangles: Hierarchy,
+    pub(crate) edges: Hierarchy,
+    pub(crate) points: Hierarchy,
+    triangles_of_triangles: Adjacency,
+    edges_of_edges: Adjacency,
+    triangles_of_points: Adjacency,
+    /// Whether `edges` and `points` are where `nodes` are.
+    features_refitted: bool,
 }
 
 impl WideBody {
     /// Packs the surface of `mesh`.
     pub(crate) fn pack(mesh: &Arc<Mesh>) -> Self {
-        let order = order::block_order(mesh);
+        let at = |node: u32| mesh.nodes()[node as usize];
+        let node_positions: Vec<Point> = mesh.surface_nodes().iter().map(|&n| at(n)).collect();
+        let order = order::block_order(&node_positions);
+        let surface_nodes: Vec<u32> =
+            order.iter().map(|&index| mesh.surface_nodes()[index as usize]).collect();
         let mut local = vec![NONE; mesh.nodes().len()];
-        let mut surface_nodes = Vec::with_capacity(mesh.surface_nodes().len());
-        let owned_by_triangle = owned_features(mesh);
-        let (mut slots, mut owned) = (Vec::new(), Vec::new());
-        for &triangle in &order {
-            let [a, b, c] = mesh.triangles()[triangle as usize].map(|node| {
-                let index = &mut local[node as usize];
-                if *index == NONE {
-                    *index = surface_nodes.len() as u32;
-                    surface_nodes.push(node);
-                }
-                *index
-            });
-            slots.push([a, b, c, triangle]);
-            owned.push(owned_by_triangle[triangle as usize]);
+        for (index, &node) in surface_nodes.iter().enumerate() {
+            local[node as usize] = index as u32;
         }
-        slots.resize(order.len().next_multiple_of(WIDTH), [0, 0, 0, NONE]);
-        owned.resize(slots.len(), 0);
-        let adjacency = Adjacency::new(&slots, &owned, surface_nodes.len());
+        let element = |corners: [u32; 3]| corners.map(|node| local[node as usize]);
+        let triangles: Vec<_> = mesh.triangles().iter().map(|&corners| element(corners)).collect();
+        let edges: Vec<_> = mesh.surface_edges().iter().map(|&[a, b]| element([a, b, b])).collect();
+        let points: Vec<_> = surface_nodes.iter().map(|&node| element([node; 3])).collect();
+        let local_positions: Vec<Point> = surface_nodes.iter().map(|&node| at(node)).collect();
+        let hierarchy = |elements: &[[u32; 3]]| Hierarchy::new(elements, &local_positions);
+        let (triangles, edges) = (hierarchy(&triangles), hierarchy(&edges));
+        let points = Hierarchy::in_order(&points);
+        let node_count = surface_nodes.len();
         Self {
             mesh: Arc::clone(mesh),
-            nodes: vec![[0.0; 4]; surface_nodes.len()],
+            nodes: vec![[0.0; 4]; node_count],
             surface_nodes,
-            levels: boxes::empty_levels(slots.len() / WIDTH),
-            above: Block::EMPTY,
-            slots,
-            owned,
-            adjacency,
+            triangles_of_triangles: Adjacency::new(&triangles, &triangles, true, node_count),
+            edges_of_edges: Adjacency::new(&edges, &edges, true, node_count),
+            triangles_of_points: Adjacency::new(&points, &triangles, false, node_count),
+            triangles,
+            edges,
+            points,
+            features_refitted: false,
         }
     }
 
@@ -92,64 +94,40 @@ impl WideBody {
         Arc::ptr_eq(&self.mesh, mesh)
     }
 
-    pub(crate) fn adjacency(&self) -> &Adjacency {
-        &self.adjacency
+    /// The mesh's node in a slot of `points`.
+    pub(crate) fn mesh_node(&self, slot: u32) -> u32 {
+        self.surface_nodes[slot as usize]
     }
 
-    /// The mesh's node of an index into `nodes`.
-    pub(crate) fn mesh_node(&self, node: u32) -> u32 {
-        self.surface_nodes[node as usize]
-    }
-
-    pub(crate) fn slots(&self) -> &[[u32; 4]] {
-        &self.slots
-    }
-
-    /// The mesh's triangle in a slot.
-    pub(crate) fn triangle(&self, slot: u32) -> u32 {
-        self.slots[slot as usize][3]
-    }
-
-    pub(crate) fn owned(&self, slot: u32) -> u8 {
-        self.owned[slot as usize]
-    }
-
-    /// Number of levels; zero without triangles.
-    pub(crate) fn depth(&self) -> usize {
-        self.levels.len()
-    }
-
-    /// Blocks of level `k`, of any k.
-    pub(crate) fn level(&self, k: usize) -> &[Block] {
-        self.levels.get(k).map_or(std::slice::from_ref(&self.above), Vec::as_slice)
-    }
-
-    /// At least the largest coordinate of the body relative to the origin; infinite where `f32` ends.
-    pub(crate) fn largest_coordinate(&self) -> f32 {
-        let [min, max] = [self.above.min, self.above.max].map(|side| side.map(|axis| axis[0]));
-        min.iter().chain(&max).fold(0.0, |largest, value| largest.max(value.abs()))
-    }
-
-    /// Moves the body: all boxes anew, one pass per level.
+    /// Moves the body: the boxes of its triangles anew, one pass per level.
     pub(crate) fn refit(&mut self, isa: Isa, positions: &[Point], origin: Point) {
         boxes::narrow(&mut self.nodes, &self.surface_nodes, positions, origin);
-        boxes::refit(isa, &self.nodes, &self.slots, &mut self.levels, &mut self.above);
+        self.triangles.refit(isa, &self.nodes);
+        self.features_refitted = false;
     }
-}
 
-/// Per triangle the features that it owns: those that no triangle before it has.
-fn owned_features(mesh: &Mesh) -> Vec<u8> {
-    let mut node_seen = vec![false; mesh.nodes().len()];
-    let mut edge_seen = vec![false; mesh.surface_edges().len()];
-    let triangles = mesh.triangles().iter().zip(mesh.triangle_edges());
-    let owned = triangles.map(|(nodes, edges)| {
-        let mut bits = 0;
-        for i in 0..3 {
-            let new_node = !std::mem::replace(&mut node_seen[nodes[i] as usize], true);
-            let new_edge = !std::mem::replace(&mut edge_seen[edges[i] as usize], true);
-            bits |= u8::from(new_node) << i | u8::from(new_edge) << (3 + i);
+    /// The boxes of edges and points anew, unless the body has not moved since.
+    pub(crate) fn refit_features(&mut self, isa: Isa) {
+        if !std::mem::replace(&mut self.features_refitted, true) {
+            self.edges.refit(isa, &self.nodes);
+            self.points.refit(isa, &self.nodes);
         }
-        bits
-    });
-    owned.collect()
+    }
+
+    /// Triangles of two bodies, which may be the same, further apart than `margin` being of no use;
+    /// likewise edges, and the nodes of a against the triangles of b.
+    pub(crate) fn triangles_and_triangles<'a>(&'a self, b: &'a Self, margin: f64) -> Sides<'a> {
+        let own = std::ptr::eq(self, b).then_some(&self.triangles_of_triangles);
+        Sides { a: &self.triangles, b: &b.triangles, same: own.is_some(), own, margin }
+    }
+
+    pub(crate) fn edges_and_edges<'a>(&'a self, b: &'a Self, margin: f64) -> Sides<'a> {
+        let own = std::ptr::eq(self, b).then_some(&self.edges_of_edges);
+        Sides { a: &self.edges, b: &b.edges, same: own.is_some(), own, margin }
+    }
+
+    pub(crate) fn points_and_triangles<'a>(&'a self, b: &'a Self, margin: f64) -> Sides<'a> {
+        let own = std::ptr::eq(self, b).then_some(&self.triangles_of_points);
+        Sides { a: &self.points, b: &b.triangles, same: false, own, margin }
+    }
 }

@@ -1,5 +1,6 @@
 //! The wide layout's method: blocks of eight triangles against each other, level by level.
 
+use std::ops::Range;
 use std::time::Instant;
 
 use palpate_geometry::{Point, triangles_intersect};
@@ -10,9 +11,7 @@ use crate::pairs::{ProximityPair, TrianglePair};
 use crate::proximity::{edge_pair, sort, vertex_triangle};
 use crate::scene::{Frame, IntersectionOptions, Intersections, Proximity, SceneBody};
 use crate::simd::Isa;
-use crate::wide::{
-    EdgePairs, Reach, SeparateTriangles, Sides, Traversal, VertexPairs, WideBody, bits, owned_pairs,
-};
+use crate::wide::{EdgePairs, Reach, SeparateTriangles, Sides, Traversal, VertexPairs, WideBody};
 
 /// Block pairs, and pairs of neighbouring blocks, that one thread takes at a time.
 const PAIRS_PER_TASK: usize = 64;
@@ -23,7 +22,7 @@ pub(super) struct Wide {
     isa: Isa,
     bodies: Vec<WideBody>,
     objects: Vec<(u32, u32)>,
-    body_pairs: Vec<BodyPair>,
+    searches: Vec<ElementSearch>,
     splitting: Traversal,
     seeds: Vec<[u32; 2]>,
     tasks: Vec<Task>,
@@ -31,10 +30,46 @@ pub(super) struct Wide {
     close: Vec<Worker<ProximityPair>>,
 }
 
-/// Part of the search for one body pair.
+/// A body pair, and which of their elements.
+#[derive(Clone, Copy, Debug)]
+struct ElementSearch {
+    pair: BodyPair,
+    elements: Elements,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Elements {
+    Triangles,
+    Edges,
+    /// Nodes of a and triangles of b.
+    NodesOfA,
+    /// Nodes of b and triangles of a.
+    NodesOfB,
+}
+
+impl ElementSearch {
+    /// The bodies in the order of the elements.
+    fn bodies(&self) -> [u32; 2] {
+        match self.elements {
+            Elements::NodesOfB => [self.pair.b, self.pair.a],
+            _ => [self.pair.a, self.pair.b],
+        }
+    }
+
+    fn sides<'a>(&self, bodies: &'a [WideBody]) -> Sides<'a> {
+        let [a, b] = self.bodies().map(|body| &bodies[body as usize]);
+        match self.elements {
+            Elements::Triangles => a.triangles_and_triangles(b, self.pair.margin),
+            Elements::Edges => a.edges_and_edges(b, self.pair.margin),
+            _ => a.points_and_triangles(b, self.pair.margin),
+        }
+    }
+}
+
+/// Part of a search.
 #[derive(Clone, Copy, Debug)]
 struct Task {
-    body_pair: u32,
+    search: u32,
     part: Part,
 }
 
@@ -55,7 +90,6 @@ struct Worker<T> {
     candidates: Vec<[u32; 2]>,
     groups: Vec<Group>,
     kept: Vec<[u32; 2]>,
-    features: Features,
     found: Vec<T>,
     cost: Cost,
 }
@@ -68,7 +102,6 @@ impl<T> Default for Worker<T> {
             candidates: Vec::new(),
             groups: Vec::new(),
             kept: Vec::new(),
-            features: Features::default(),
             found: Vec::new(),
             cost: Cost::default(),
         }
@@ -80,14 +113,6 @@ impl<T> Default for Worker<T> {
 struct Group {
     task: Task,
     end: usize,
-}
-
-/// Candidate pairs of features: nodes of a against triangles of b, of b against a, and edges.
-#[derive(Debug, Default)]
-struct Features {
-    nodes_of_a: Vec<[u32; 2]>,
-    nodes_of_b: Vec<[u32; 2]>,
-    edges: Vec<[u32; 2]>,
 }
 
 impl Default for Wide {
@@ -102,7 +127,7 @@ impl Wide {
             isa,
             bodies: Vec::new(),
             objects: Vec::new(),
-            body_pairs: Vec::new(),
+            searches: Vec::new(),
             splitting: Traversal::default(),
             seeds: Vec::new(),
             tasks: Vec::new(),
@@ -111,48 +136,40 @@ impl Wide {
         }
     }
 
-    /// Cuts the work for all body pairs into tasks: whole body pairs without threads, else about
-    /// [`PAIRS_PER_TASK`] block pairs each.
+    /// Cuts all searches into tasks: without threads one or two each, else of about
+    /// [`PAIRS_PER_TASK`] block pairs.
     fn split(&mut self, threads: bool, cost: &mut Cost) {
         self.seeds.clear();
         self.tasks.clear();
         let chunk = if threads { PAIRS_PER_TASK } else { usize::MAX };
-        for (index, pair) in self.body_pairs.iter().enumerate() {
-            let sides = sides(self.isa, &self.bodies, pair);
-            if sides.a.depth() == 0 || sides.b.depth() == 0 {
-                continue;
-            }
-            let body_pair = index as u32;
-            let mut level = sides.top();
-            if !sides.is_self || level > 0 {
+        for (index, search) in self.searches.iter().enumerate() {
+            let sides = search.sides(&self.bodies);
+            let search = index as u32;
+            if let Some(mut level) = sides.top() {
                 let traversal = &mut self.splitting;
                 traversal.pairs.clear();
                 traversal.pairs.push([0, 0]);
                 while threads && level > 1 && traversal.pairs.len() < PAIRS_PER_TASK {
-                    traversal.descend(&sides, level, cost);
+                    traversal.descend(self.isa, &sides, level, cost);
                     level -= 1;
                 }
                 let first = self.seeds.len();
                 self.seeds.extend_from_slice(&traversal.pairs);
-                for start in (first..self.seeds.len()).step_by(chunk.min(self.seeds.len().max(1))) {
-                    let seeds = [start, self.seeds.len().min(start.saturating_add(chunk))];
-                    self.tasks.push(Task { body_pair, part: Part::Blocks { level, seeds } });
+                for seeds in chunks(first..self.seeds.len(), chunk) {
+                    self.tasks.push(Task { search, part: Part::Blocks { level, seeds } });
                 }
             }
-            if sides.is_self {
-                let count = sides.a.adjacency().pairs.len();
-                for start in (0..count).step_by(chunk.min(count.max(1))) {
-                    let end = count.min(start.saturating_add(chunk));
-                    self.tasks.push(Task { body_pair, part: Part::Adjacent([start, end]) });
-                }
+            for range in chunks(0..sides.adjacent_count(), chunk) {
+                self.tasks.push(Task { search, part: Part::Adjacent(range) });
             }
         }
     }
 }
 
-fn sides<'a>(isa: Isa, bodies: &'a [WideBody], pair: &BodyPair) -> Sides<'a> {
-    let (a, b) = (&bodies[pair.a as usize], &bodies[pair.b as usize]);
-    Sides { isa, a, b, is_self: pair.is_self(), margin: pair.margin }
+fn chunks(range: Range<usize>, size: usize) -> impl Iterator<Item = [usize; 2]> {
+    let count = range.len().div_ceil(size);
+    let end = move |i: usize| range.end.min(range.start.saturating_add(i.saturating_mul(size)));
+    (0..count).map(move |i| [end(i), end(i + 1)])
 }
 
 impl Detector for Wide {
@@ -196,19 +213,23 @@ impl Detector for Wide {
         stats.all_pairs = frame.all_pairs(options.self_contact);
         self.objects.clear();
         stats.nodes_visited += frame.upper.pairs(&mut self.objects);
-        self.body_pairs.clear();
-        self.body_pairs.extend(self.objects.iter().map(|&(a, b)| BodyPair::meeting(a, b)));
+        let triangles = |a: u32, b: u32| ElementSearch {
+            pair: BodyPair::meeting(a, b),
+            elements: Elements::Triangles,
+        };
+        self.searches.clear();
+        self.searches.extend(self.objects.iter().map(|&(a, b)| triangles(a, b)));
         if options.self_contact {
             let bodies = 0..frame.bodies.len() as u32;
-            self.body_pairs.extend(bodies.map(|body| BodyPair::meeting(body, body)));
+            self.searches.extend(bodies.map(|body| triangles(body, body)));
         }
-        stats.object_pairs += self.body_pairs.len() as u64;
+        stats.object_pairs += self.searches.len() as u64;
         stats.object_time = start.elapsed();
         let start = Instant::now();
         let mut cost = Cost::default();
         self.split(frame.pool.is_some(), &mut cost);
-        let Self { isa, bodies, body_pairs, seeds, tasks, meeting, .. } = self;
-        let search = Search { isa: *isa, frame, bodies, body_pairs, seeds, tasks };
+        let Self { isa, bodies, searches, seeds, tasks, meeting, .. } = self;
+        let search = Search { isa: *isa, frame, bodies, searches, seeds, tasks };
         let workers = search.workers(meeting);
         for_each(frame.pool, workers, |worker| search.traverse(worker));
         let traversed = Instant::now();
@@ -228,22 +249,28 @@ impl Detector for Wide {
         let stats = &mut found.stats;
         stats.all_pairs = frame.all_pairs(true);
         let scene_bounds = frame.upper.bounds();
-        self.body_pairs.clear();
+        self.searches.clear();
         for a in 0..frame.bodies.len() {
             for b in a..frame.bodies.len() {
                 if let Some(distance) = distance(a, b).filter(|&distance| distance > 0.0) {
                     let pair = BodyPair::within(a as u32, b as u32, distance, &scene_bounds);
-                    self.body_pairs.push(pair);
+                    stats.object_pairs += 1;
+                    for elements in [Elements::Edges, Elements::NodesOfA, Elements::NodesOfB] {
+                        if a != b || !matches!(elements, Elements::NodesOfB) {
+                            self.searches.push(ElementSearch { pair, elements });
+                        }
+                    }
                 }
             }
         }
-        stats.object_pairs += self.body_pairs.len() as u64;
         stats.object_time = start.elapsed();
         let start = Instant::now();
+        let isa = self.isa;
+        for_each(frame.pool, &mut self.bodies, |body| body.refit_features(isa));
         let mut cost = Cost::default();
         self.split(frame.pool.is_some(), &mut cost);
-        let Self { isa, bodies, body_pairs, seeds, tasks, close, .. } = self;
-        let search = Search { isa: *isa, frame, bodies, body_pairs, seeds, tasks };
+        let Self { isa, bodies, searches, seeds, tasks, close, .. } = self;
+        let search = Search { isa: *isa, frame, bodies, searches, seeds, tasks };
         let workers = search.workers(close);
         for_each(frame.pool, workers, |worker| search.traverse(worker));
         let traversed = Instant::now();
@@ -264,7 +291,7 @@ struct Search<'a> {
     isa: Isa,
     frame: &'a Frame<'a>,
     bodies: &'a [WideBody],
-    body_pairs: &'a [BodyPair],
+    searches: &'a [ElementSearch],
     seeds: &'a [[u32; 2]],
     tasks: &'a [Task],
 }
@@ -289,18 +316,19 @@ impl Search<'_> {
         groups.clear();
         *cost = Cost::default();
         for &task in &self.tasks[tasks[0]..tasks[1]] {
-            let sides = sides(self.isa, self.bodies, &self.body_pairs[task.body_pair as usize]);
+            let sides = self.searches[task.search as usize].sides(self.bodies);
             match task.part {
                 Part::Blocks { level, seeds } => {
                     traversal.pairs.clear();
                     traversal.pairs.extend_from_slice(&self.seeds[seeds[0]..seeds[1]]);
                     for level in (1..=level).rev() {
-                        traversal.descend(&sides, level, cost);
+                        traversal.descend(self.isa, &sides, level, cost);
                     }
-                    traversal.collect(&sides, candidates, cost);
+                    traversal.collect(self.isa, &sides, candidates, cost);
                 }
                 Part::Adjacent([start, end]) => {
-                    traversal.collect_adjacent(&sides, start..end, candidates, cost);
+                    let range = start..end;
+                    traversal.collect_adjacent(self.isa, &sides, range, candidates, cost);
                 }
             }
             groups.push(Group { task, end: candidates.len() });
@@ -313,7 +341,7 @@ impl Search<'_> {
         found.clear();
         let mut start = 0;
         for group in groups.iter() {
-            let pair = &self.body_pairs[group.task.body_pair as usize];
+            let pair = &self.searches[group.task.search as usize].pair;
             let (a, b) = (&self.bodies[pair.a as usize], &self.bodies[pair.b as usize]);
             let reach = Reach::new(a, b, 0.0);
             kept.clear();
@@ -324,7 +352,8 @@ impl Search<'_> {
             let (body_a, body_b) =
                 (&self.frame.bodies[pair.a as usize], &self.frame.bodies[pair.b as usize]);
             for &[slot_a, slot_b] in kept.iter() {
-                let (mut triangle_a, mut triangle_b) = (a.triangle(slot_a), b.triangle(slot_b));
+                let (mut triangle_a, mut triangle_b) =
+                    (a.triangles.element(slot_a), b.triangles.element(slot_b));
                 let points = (body_a.triangle(triangle_a), body_b.triangle(triangle_b));
                 if triangles_intersect(&points.0, &points.1) {
                     if pair.is_self() && triangle_b < triangle_a {
@@ -337,104 +366,37 @@ impl Search<'_> {
         }
     }
 
-    /// Measures the features of the candidates, and of neighbours.
+    /// Measures the distances of the candidates.
     fn close(&self, worker: &mut Worker<ProximityPair>) {
-        let Worker { candidates, groups, kept, features, found, cost, .. } = worker;
+        let Worker { candidates, groups, kept, found, cost, .. } = worker;
         found.clear();
+        let scene = self.frame.bodies;
         let mut start = 0;
         for group in groups.iter() {
-            let pair = &self.body_pairs[group.task.body_pair as usize];
-            let (a, b) = (&self.bodies[pair.a as usize], &self.bodies[pair.b as usize]);
+            let search = &self.searches[group.task.search as usize];
+            let pair = &search.pair;
+            let bodies = search.bodies();
+            let [a, b] = bodies.map(|body| &self.bodies[body as usize]);
             let reach = Reach::new(a, b, pair.margin);
-            kept.clear();
             let candidates = &candidates[start..group.end];
-            self.isa.run(SeparateTriangles { a, b, reach, candidates, kept });
             start = group.end;
-            features.clear();
-            for &slots in kept.iter() {
-                let [owned_a, owned_b] = [a.owned(slots[0]), b.owned(slots[1])];
-                features.add(a, b, slots, owned_pairs(owned_a, owned_b));
-            }
-            if let Part::Adjacent([start, end]) = group.task.part {
-                features.add_neighbours(a, start..end);
-            }
-            self.measure(pair, reach, features, kept, found, cost);
-        }
-    }
-
-    fn measure(
-        &self,
-        pair: &BodyPair,
-        reach: Reach,
-        features: &Features,
-        kept: &mut Vec<[u32; 2]>,
-        found: &mut Vec<ProximityPair>,
-        cost: &mut Cost,
-    ) {
-        let scene = self.frame.bodies;
-        let (a, b) = (&self.bodies[pair.a as usize], &self.bodies[pair.b as usize]);
-        let directions = [
-            (&features.nodes_of_a, a, b, [pair.a, pair.b]),
-            (&features.nodes_of_b, b, a, [pair.b, pair.a]),
-        ];
-        for (candidates, from, to, bodies) in directions {
             kept.clear();
-            self.isa.run(VertexPairs { from, to, reach, candidates, kept });
-            cost.polygon_tests += kept.len() as u64;
-            for &[node, slot] in kept.iter() {
-                let elements = [from.mesh_node(node), to.triangle(slot)];
-                found.extend(vertex_triangle(scene, bodies, elements, pair.distance));
-            }
-        }
-        kept.clear();
-        let candidates = &features.edges;
-        self.isa.run(EdgePairs { a, b, reach, candidates, kept });
-        cost.polygon_tests += kept.len() as u64;
-        for &[edge_a, edge_b] in kept.iter() {
-            let edge = |body: &WideBody, scene: &SceneBody, edge: u32| {
-                let triangle = body.triangle(edge / 4);
-                scene.mesh.triangle_edges()[triangle as usize][edge as usize % 4]
-            };
-            let edge_a = edge(a, &scene[pair.a as usize], edge_a);
-            let edge_b = edge(b, &scene[pair.b as usize], edge_b);
-            let swapped = pair.is_self() && edge_b < edge_a;
-            let edges = if swapped { [edge_b, edge_a] } else { [edge_a, edge_b] };
-            found.extend(edge_pair(scene, [pair.a, pair.b], edges, pair.distance));
-        }
-    }
-}
-
-impl Features {
-    fn clear(&mut self) {
-        self.nodes_of_a.clear();
-        self.nodes_of_b.clear();
-        self.edges.clear();
-    }
-
-    /// The feature pairs of `mask` of two slots.
-    #[inline]
-    fn add(&mut self, a: &WideBody, b: &WideBody, [slot_a, slot_b]: [u32; 2], mask: u16) {
-        for bit in bits(u64::from(mask)) {
-            match bit {
-                0..3 => self.nodes_of_a.push([a.slots()[slot_a as usize][bit], slot_b]),
-                3..6 => self.nodes_of_b.push([b.slots()[slot_b as usize][bit - 3], slot_a]),
-                _ => {
-                    let (i, j) = ((bit - 6) / 3, (bit - 6) % 3);
-                    self.edges.push([4 * slot_a + i as u32, 4 * slot_b + j as u32]);
+            if let Elements::Edges = search.elements {
+                self.isa.run(EdgePairs { a, b, reach, candidates, kept });
+                for &[slot_a, slot_b] in kept.iter() {
+                    let (edge_a, edge_b) = (a.edges.element(slot_a), b.edges.element(slot_b));
+                    let swapped = pair.is_self() && edge_b < edge_a;
+                    let edges = if swapped { [edge_b, edge_a] } else { [edge_a, edge_b] };
+                    found.extend(edge_pair(scene, bodies, edges, pair.distance));
+                }
+            } else {
+                self.isa.run(VertexPairs { from: a, to: b, reach, candidates, kept });
+                for &[point, slot] in kept.iter() {
+                    let elements = [a.mesh_node(point), b.triangles.element(slot)];
+                    found.extend(vertex_triangle(scene, bodies, elements, pair.distance));
                 }
             }
-        }
-    }
-
-    /// The feature pairs of triangles that share a node, of a range of neighbouring blocks.
-    fn add_neighbours(&mut self, body: &WideBody, range: std::ops::Range<usize>) {
-        let adjacency = body.adjacency();
-        for index in range {
-            let [a, b] = adjacency.pairs[index].map(|block| 8 * block);
-            let masks = &adjacency.features[adjacency.first_feature[index] as usize..];
-            for (bit, &mask) in bits(adjacency.sharing[index]).zip(masks) {
-                self.add(body, body, [a + bit as u32 / 8, b + bit as u32 % 8], mask);
-            }
+            cost.polygon_tests += kept.len() as u64;
         }
     }
 }

@@ -1,9 +1,8 @@
-//! What the connectivity of a surface decides once and for all: which pairs of triangles share a node, and
-//! which features of such a pair do not.
+//! What the connectivity of a surface decides once and for all: which pairs of elements share a node.
 
 use palpate_model::mesh::NONE;
 
-use super::WIDTH;
+use super::{Hierarchy, WIDTH};
 
 /// Lane pairs (i, j), bit 8 i + j, with i < j.
 pub(crate) const UPPER: u64 = {
@@ -15,21 +14,14 @@ pub(crate) const UPPER: u64 = {
     mask
 };
 
-/// Pairs of blocks of one body that have a node in common, a block with itself included.
+/// Pairs of blocks of one body that have a node in common: of one kind of elements with itself, or of
+/// two kinds.
 #[derive(Debug, Default)]
 pub(crate) struct Adjacency {
-    /// The pairs (a <= b), sorted.
+    /// The pairs, sorted; of one kind with itself a <= b, each block with itself included.
     pub(crate) pairs: Vec<[u32; 2]>,
     /// Per pair: the lane pairs that share no node; within one block those with i < j.
     pub(crate) apart: Vec<u64>,
-    /// Per pair: the lane pairs that share a node, each unordered pair once.
-    pub(crate) sharing: Vec<u64>,
-    /// Per pair: where its lane pairs that share a node start in `features`.
-    pub(crate) first_feature: Vec<u32>,
-    /// Per lane pair that shares a node, in the order of the bits: the pairs of owned features that
-    /// share none. Bit i: node i of the first against the second; bit 3 + i: node i of the second
-    /// against the first; bit 6 + 3 i + j: edge i of the first and edge j of the second.
-    pub(crate) features: Vec<u16>,
     /// Rows of `parents`, by block of level 1.
     parent_rows: Vec<u32>,
     /// Pairs of blocks of level 1 as (second block, child pairs that are in `pairs`).
@@ -37,46 +29,37 @@ pub(crate) struct Adjacency {
 }
 
 impl Adjacency {
-    pub(super) fn new(slots: &[[u32; 4]], owned: &[u8], node_count: usize) -> Self {
-        let (node_rows, node_slots) = slots_of_nodes(slots, node_count);
-        let (blocks, _) = slots.as_chunks::<WIDTH>();
+    /// `same`: whether a and b are one and the same.
+    pub(super) fn new(a: &Hierarchy, b: &Hierarchy, same: bool, node_count: usize) -> Self {
+        let (node_rows, node_slots) = slots_of_nodes(&b.slots, node_count);
+        let (blocks_a, _) = a.slots.as_chunks::<WIDTH>();
+        let (blocks_b, _) = b.slots.as_chunks::<WIDTH>();
         let mut adjacency = Self::default();
         let mut row: Vec<(u32, u64)> = Vec::new();
-        for (a, block) in blocks.iter().enumerate() {
+        for (a, block) in blocks_a.iter().enumerate() {
             row.clear();
-            row.push((a as u32, 0));
             for (i, slot) in block.iter().enumerate().filter(|(_, slot)| slot[3] != NONE) {
                 for &node in &slot[..3] {
                     let [start, end] = [node_rows[node as usize], node_rows[node as usize + 1]];
                     for &other in &node_slots[start as usize..end as usize] {
                         let (b, j) = (other / WIDTH as u32, other as usize % WIDTH);
-                        if b as usize >= a {
+                        if !same || b as usize >= a {
                             set(&mut row, b, i * WIDTH + j);
                         }
                     }
                 }
             }
             row.sort_unstable();
-            for &(b, mut sharing) in &row {
-                let mut all = valid_lanes(block, &blocks[b as usize]);
-                if b as usize == a {
-                    all &= UPPER;
-                    sharing &= UPPER;
+            for &(b, sharing) in &row {
+                let mut apart = valid_lanes(block, &blocks_b[b as usize]) & !sharing;
+                if same && b as usize == a {
+                    apart &= UPPER;
                 }
                 adjacency.pairs.push([a as u32, b]);
-                adjacency.apart.push(all & !sharing);
-                adjacency.sharing.push(sharing);
-                adjacency.first_feature.push(adjacency.features.len() as u32);
-                for bit in bits(sharing) {
-                    let pair = [a * WIDTH + bit / WIDTH, b as usize * WIDTH + bit % WIDTH];
-                    adjacency.features.push(free_features(
-                        pair.map(|slot| slots[slot]),
-                        pair.map(|slot| owned[slot]),
-                    ));
-                }
+                adjacency.apart.push(apart);
             }
         }
-        adjacency.collect_parents(blocks.len());
+        adjacency.collect_parents(blocks_a.len());
         adjacency
     }
 
@@ -151,34 +134,4 @@ fn slots_of_nodes(slots: &[[u32; 4]], node_count: usize) -> (Vec<u32>, Vec<u32>)
         }
     }
     (rows, result)
-}
-
-/// The pairs of owned features of two triangles, one of each, that have no node in common.
-fn free_features([a, b]: [[u32; 4]; 2], [owned_a, owned_b]: [u8; 2]) -> u16 {
-    let mut free = owned_pairs(owned_a, owned_b);
-    let (a, b) = (&a[..3], &b[..3]);
-    for i in 0..3 {
-        if b.contains(&a[i]) {
-            free &= !(1 << i);
-        }
-        if a.contains(&b[i]) {
-            free &= !(8 << i);
-        }
-        for j in 0..3 {
-            let edge = [b[j], b[(j + 1) % 3]];
-            if edge.contains(&a[i]) || edge.contains(&a[(i + 1) % 3]) {
-                free &= !(1 << (6 + 3 * i + j));
-            }
-        }
-    }
-    free
-}
-
-/// All pairs of owned features of two triangles, as bits of [`Adjacency::features`].
-#[inline]
-pub(crate) fn owned_pairs(owned_a: u8, owned_b: u8) -> u16 {
-    let (a, b) = (u16::from(owned_a), u16::from(owned_b));
-    let rows = [3, 4, 5].map(|bit| (a >> bit & 1) * (b >> 3));
-    let edges = rows[0] | rows[1] << 3 | rows[2] << 6;
-    a & 7 | (b & 7) << 3 | edges << 6
 }

@@ -13,7 +13,7 @@ pub(crate) struct VertexPairs<'a> {
     pub(crate) from: &'a WideBody,
     pub(crate) to: &'a WideBody,
     pub(crate) reach: Reach,
-    /// Index into the nodes of `from`, slot of `to`.
+    /// Slot of the points of `from`, of the triangles of `to`.
     pub(crate) candidates: &'a [[u32; 2]],
     pub(crate) kept: &'a mut Vec<[u32; 2]>,
 }
@@ -27,7 +27,7 @@ impl Kernel for VertexPairs<'_> {
         for batch in candidates.chunks(WIDTH) {
             let lane = |i: usize| batch.get(i).unwrap_or(&batch[0]);
             let nodes = std::array::from_fn(|i| &from.nodes[lane(i)[0] as usize]);
-            let slots = std::array::from_fn(|i| to.slots[lane(i)[1] as usize]);
+            let slots = std::array::from_fn(|i| to.triangles.slots[lane(i)[1] as usize]);
             let point = L::gather(nodes);
             let [a, b, c] = corners::<L>(&to.nodes, &slots);
             let triangle = [sub(a, point), sub(b, point), sub(c, point)];
@@ -43,7 +43,7 @@ pub(crate) struct EdgePairs<'a> {
     pub(crate) a: &'a WideBody,
     pub(crate) b: &'a WideBody,
     pub(crate) reach: Reach,
-    /// For a and b: 4 slot + i for edge i of a slot's triangle.
+    /// Slots of the edges of a and of b.
     pub(crate) candidates: &'a [[u32; 2]],
     pub(crate) kept: &'a mut Vec<[u32; 2]>,
 }
@@ -71,16 +71,10 @@ impl Kernel for EdgePairs<'_> {
     }
 }
 
-/// Corners of edge i; the fourth entry does not occur.
-const NEXT: [[usize; 2]; 4] = [[0, 1], [1, 2], [2, 0], [0, 0]];
-
 /// Start (0) or end (1) of each edge.
 #[inline(always)]
-fn ends(body: &WideBody, edges: [u32; WIDTH], which: usize) -> [&[f32; 4]; WIDTH] {
-    edges.map(|edge| {
-        let corner = NEXT[edge as usize % 4][which];
-        &body.nodes[body.slots[edge as usize / 4][corner] as usize]
-    })
+fn ends(body: &WideBody, slots: [u32; WIDTH], which: usize) -> [&[f32; 4]; WIDTH] {
+    slots.map(|slot| &body.nodes[body.edges.slots[slot as usize][which] as usize])
 }
 
 #[inline(always)]

@@ -1,34 +1,25 @@
-//! The order of the triangles: split by count, so that blocks and the groups above them are full.
+//! The order of the elements: split by count, so that blocks and the groups above them are full.
 
 use palpate_geometry::{Aabb, Point};
-use palpate_model::Mesh;
 
 use super::WIDTH;
 
-/// Triangles in the order of the leaves of a tree that halves them along the longest axis of their
-/// centroids, at multiples of the largest group of blocks that still fits.
-pub(super) fn block_order(mesh: &Mesh) -> Vec<u32> {
-    let centroids: Vec<Point> = mesh
-        .triangles()
-        .iter()
-        .map(|corners| {
-            let [a, b, c] = corners.map(|node| mesh.nodes()[node as usize]);
-            std::array::from_fn(|axis| a[axis] / 3.0 + b[axis] / 3.0 + c[axis] / 3.0)
-        })
-        .collect();
-    let mut order: Vec<u32> = (0..centroids.len() as u32).collect();
+/// Elements in the order of the leaves of a tree that halves them along the longest axis of their
+/// centers, at multiples of the largest group of blocks that still fits.
+pub(super) fn block_order(centers: &[Point]) -> Vec<u32> {
+    let mut order: Vec<u32> = (0..centers.len() as u32).collect();
     let mut pending = vec![(0, order.len())];
     while let Some((start, end)) = pending.pop() {
         let range = &mut order[start..end];
         if range.len() <= WIDTH {
             continue;
         }
-        let bounds = Aabb::from_points(range.iter().map(|&t| &centroids[t as usize]));
+        let bounds = Aabb::from_points(range.iter().map(|&t| &centers[t as usize]));
         let axis = bounds.longest_axis();
         let count = left_count(range.len());
         // Ties by index: the same order on every machine.
         range.select_nth_unstable_by(count, |&left, &right| {
-            let order = centroids[left as usize][axis].total_cmp(&centroids[right as usize][axis]);
+            let order = centers[left as usize][axis].total_cmp(&centers[right as usize][axis]);
             order.then(left.cmp(&right))
         });
         pending.push((start, start + count));

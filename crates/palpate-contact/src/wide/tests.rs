@@ -6,9 +6,10 @@ use palpate_geometry::Point;
 use palpate_model::mesh::NONE;
 use palpate_model::{Mesh, MeshData};
 
+use super::adjacency::{Adjacency, bits};
 use super::boxes::Block;
 use super::traverse::Overlap;
-use super::{EdgePairs, Reach, SeparateTriangles, VertexPairs, WideBody, bits};
+use super::{EdgePairs, Hierarchy, Reach, SeparateTriangles, VertexPairs, WideBody};
 use crate::simd::Isa;
 
 struct Random(u64);
@@ -98,8 +99,8 @@ fn boxes_hold_their_triangles_and_children_at_any_scale() {
         let origin = if round % 2 == 0 { [0.0; 3] } else { positions[0] };
         body.refit(Isa::detect(), &positions, origin);
         let mut seen = vec![0; mesh.triangles().len()];
-        for (slot, &[.., triangle]) in body.slots.iter().enumerate() {
-            let (block, lane) = (&body.level(0)[slot / 8], slot % 8);
+        for (slot, &[.., triangle]) in body.triangles.slots.iter().enumerate() {
+            let (block, lane) = (&body.triangles.level(0)[slot / 8], slot % 8);
             if triangle == NONE {
                 assert!((0..3).all(|axis| block.min[axis][lane] > block.max[axis][lane]));
                 continue;
@@ -116,9 +117,9 @@ fn boxes_hold_their_triangles_and_children_at_any_scale() {
             }
         }
         assert!(seen.iter().all(|&count| count == 1));
-        for level in 0..body.depth() {
-            for (index, block) in body.level(level).iter().enumerate() {
-                let parent = &body.level(level + 1)[index / 8];
+        for level in 0..body.triangles.depth() {
+            for (index, block) in body.triangles.level(level).iter().enumerate() {
+                let parent = &body.triangles.level(level + 1)[index / 8];
                 for axis in 0..3 {
                     for lane in 0..8 {
                         assert!(parent.min[axis][index % 8] <= block.min[axis][lane]);
@@ -133,32 +134,56 @@ fn boxes_hold_their_triangles_and_children_at_any_scale() {
 #[test]
 fn adjacency_is_what_the_corners_say() {
     let mut random = Random(5);
-    for count in [1, 7, 8, 9, 64, 65, 300] {
+    for count in [1, 7, 8, 9, 64, 65, 150] {
         let body = WideBody::pack(&tangle(count, &mut random));
-        let corners = |slot: u32| &body.slots[slot as usize][..3];
-        let (mut sharing, mut apart) = (Vec::new(), Vec::new());
-        for (index, &[a, b]) in body.adjacency.pairs.iter().enumerate() {
-            assert_eq!(body.adjacency.child_pairs([a / 8, b / 8]) >> (8 * (a % 8) + b % 8) & 1, 1);
-            for (mask, list) in [
-                (body.adjacency.sharing[index], &mut sharing),
-                (body.adjacency.apart[index], &mut apart),
-            ] {
-                list.extend(bits(mask).map(|bit| [8 * a + bit as u32 / 8, 8 * b + bit as u32 % 8]));
-            }
-        }
-        let is_adjacent = |i: u32, j: u32| body.adjacency.pairs.contains(&[i / 8, j / 8]);
-        for i in 0..count as u32 {
-            for j in i + 1..count as u32 {
-                let share = corners(i).iter().any(|node| corners(j).contains(node));
-                let occurs = |list: &[[u32; 2]]| {
-                    list.iter().filter(|&&pair| pair == [i, j] || pair == [j, i]).count()
-                };
-                assert_eq!(occurs(&sharing), usize::from(share));
-                assert_eq!(occurs(&apart), usize::from(!share && is_adjacent(i, j)));
-            }
-        }
-        assert!(sharing.iter().chain(&apart).flatten().all(|&slot| (slot as usize) < count));
+        let (a, b, c) = (&body.triangles, &body.edges, &body.points);
+        check_adjacency(a, a, true, &body.triangles_of_triangles);
+        check_adjacency(b, b, true, &body.edges_of_edges);
+        check_adjacency(c, a, false, &body.triangles_of_points);
     }
+}
+
+/// Each pair of elements shares a node, or is left to the masks of neighbouring blocks, or to the
+/// traversal.
+fn check_adjacency(a: &Hierarchy, b: &Hierarchy, same: bool, adjacency: &Adjacency) {
+    let mut apart = Vec::new();
+    for (&[i, j], &mask) in adjacency.pairs.iter().zip(&adjacency.apart) {
+        assert!(!same || i <= j);
+        assert_eq!(adjacency.child_pairs([i / 8, j / 8]) >> (8 * (i % 8) + j % 8) & 1, 1);
+        apart.extend(bits(mask).map(|bit| [8 * i + bit as u32 / 8, 8 * j + bit as u32 % 8]));
+    }
+    let mut sorted = apart.clone();
+    for pair in &mut sorted {
+        if same {
+            pair.sort_unstable();
+        }
+    }
+    sorted.sort_unstable();
+    let child_pairs = |i: usize, j: usize| adjacency.child_pairs([i as u32, j as u32]).count_ones();
+    let (rows, columns) = (a.level(1).len(), b.level(1).len());
+    let children: u32 = (0..rows)
+        .flat_map(|i| (0..columns).map(move |j| (i, j)))
+        .map(|(i, j)| child_pairs(i, j))
+        .sum();
+    assert_eq!(children as usize, adjacency.pairs.len());
+    let is_adjacent = |i: u32, j: u32| adjacency.pairs.binary_search(&[i / 8, j / 8]).is_ok();
+    let elements =
+        |side: &Hierarchy| side.slots.iter().filter(|slot| slot[3] != NONE).count() as u32;
+    for i in 0..elements(a) {
+        for j in 0..elements(b) {
+            if same && j <= i {
+                continue;
+            }
+            let corners = [&a.slots[i as usize][..3], &b.slots[j as usize][..3]];
+            let share = corners[0].iter().any(|node| corners[1].contains(node));
+            let end = |pair: &[u32; 2]| *pair <= [i, j];
+            let occurs =
+                sorted.partition_point(end) - sorted.partition_point(|pair| *pair < [i, j]);
+            assert_eq!(occurs, usize::from(!share && is_adjacent(i, j)));
+            assert!(!share || is_adjacent(i, j));
+        }
+    }
+    assert!(apart.iter().all(|&[i, j]| i < elements(a) && j < elements(b)));
 }
 
 #[test]
@@ -172,22 +197,29 @@ fn every_kernel_gives_the_same_bits_on_both_paths() {
             [0, 1].map(|i| {
                 let mut body = WideBody::pack(&meshes[i]);
                 body.refit(isa, &moved[i], moved[0][0]);
+                body.refit_features(isa);
                 body
             })
         };
         let ([a, b], [slow_a, slow_b]) = (packed(fast), packed(Isa::Scalar));
         for (body, slow) in [(&a, &slow_a), (&b, &slow_b)] {
-            for level in 0..=body.depth() {
-                assert_eq!(bits_of(body.level(level)), bits_of(slow.level(level)));
+            for (fast, slow) in [
+                (&body.triangles, &slow.triangles),
+                (&body.edges, &slow.edges),
+                (&body.points, &slow.points),
+            ] {
+                for level in 0..=fast.depth() {
+                    assert_eq!(bits_of(fast.level(level)), bits_of(slow.level(level)));
+                }
             }
         }
         for margin in [0.0, 1e-3, 0.2, 1e300] {
-            let blocks = |body: &WideBody| body.level(0).len() as u32;
+            let blocks = |body: &WideBody| body.triangles.level(0).len() as u32;
             let pairs: Vec<[u32; 2]> =
                 (0..blocks(&a)).flat_map(|i| (0..blocks(&b)).map(move |j| [i, j])).collect();
             let masks = |isa: Isa| {
                 let mut masks = Vec::new();
-                let (a, b) = (a.level(0), b.level(0));
+                let (a, b) = (a.triangles.level(0), b.triangles.level(0));
                 isa.run(Overlap { a, b, pairs: &pairs, margin, masks: &mut masks });
                 masks
             };
@@ -196,10 +228,8 @@ fn every_kernel_gives_the_same_bits_on_both_paths() {
             let mut candidate = |ends: [usize; 2]| ends.map(|end| random.below(end) as u32);
             let triangles: Vec<_> = (0..99).map(|_| candidate([90, 37])).collect();
             let nodes: Vec<_> = (0..99).map(|_| candidate([a.nodes.len(), 37])).collect();
-            let edges: Vec<_> = (0..99)
-                .map(|_| candidate([90, 37]))
-                .map(|[i, j]| [4 * i + (i ^ j) % 3, 4 * j + (i + j) % 3])
-                .collect();
+            let counts = [0, 1].map(|i| meshes[i].surface_edges().len());
+            let edges: Vec<_> = (0..99).map(|_| candidate(counts)).collect();
             let kept = |isa: Isa| {
                 let (a, b) = (&a, &b);
                 let mut lists: [Vec<[u32; 2]>; 3] = Default::default();

@@ -1,9 +1,9 @@
 //! Simultaneous traversal, level by level, on lists of block pairs.
 
-use super::adjacency::{UPPER, bits};
+use super::adjacency::{Adjacency, UPPER, bits};
 use super::boxes::{Block, at_least_lowest, at_most_largest, rounding};
 use super::separation::round_up;
-use super::{WIDTH, WideBody};
+use super::{Hierarchy, WIDTH};
 use crate::leaf_pairs::Cost;
 use crate::simd::{Isa, Kernel, Lanes};
 
@@ -19,42 +19,51 @@ pub(crate) struct Traversal {
 /// What a traversal compares.
 #[derive(Clone, Copy)]
 pub(crate) struct Sides<'a> {
-    pub(crate) isa: Isa,
-    pub(crate) a: &'a WideBody,
-    pub(crate) b: &'a WideBody,
-    pub(crate) is_self: bool,
+    pub(crate) a: &'a Hierarchy,
+    pub(crate) b: &'a Hierarchy,
+    /// Whether a and b are one and the same: each unordered pair is then met once.
+    pub(super) same: bool,
+    /// For one body: what shares a node.
+    pub(super) own: Option<&'a Adjacency>,
     /// Boxes further apart than this [m] are not wanted.
-    pub(crate) margin: f64,
+    pub(super) margin: f64,
 }
 
 impl Sides<'_> {
-    /// The level of the single first block pair: the deeper body's last. Zero for one block against
-    /// itself, which has no traversal.
-    pub(crate) fn top(&self) -> usize {
-        self.a.depth().max(self.b.depth()).saturating_sub(1)
+    /// The level of the first block pair (0, 0); `None` where there is nothing to traverse: no elements,
+    /// or one block of each, of one body.
+    pub(crate) fn top(&self) -> Option<usize> {
+        let (a, b) = (self.a.depth(), self.b.depth());
+        let nothing = a == 0 || b == 0 || (self.own.is_some() && a.max(b) == 1);
+        (!nothing).then(|| a.max(b) - 1)
+    }
+
+    /// Number of block pairs that share a node, which the traversal leaves out.
+    pub(crate) fn adjacent_count(&self) -> usize {
+        self.own.map_or(0, |adjacency| adjacency.pairs.len())
     }
 }
 
 impl Traversal {
     /// Goes down one level, from `level`, which is not 0.
-    pub(crate) fn descend(&mut self, sides: &Sides, level: usize, cost: &mut Cost) {
-        self.test(sides, level, cost);
+    pub(crate) fn descend(&mut self, isa: Isa, sides: &Sides, level: usize, cost: &mut Cost) {
+        self.test(isa, sides, level, cost);
         self.next.clear();
         for (&[a, b], &mask) in self.pairs.iter().zip(&self.masks) {
             let mut mask = mask;
-            if sides.is_self {
-                if a == b {
-                    mask &= UPPER;
-                    if level > 1 {
-                        let count = sides.a.level(level - 1).len() as u32;
-                        let first = a * WIDTH as u32;
-                        let children = first..(first + WIDTH as u32).min(count);
-                        self.next.extend(children.map(|child| [child, child]));
-                    }
+            if sides.same && a == b {
+                mask &= UPPER;
+                if level > 1 {
+                    let count = sides.a.level(level - 1).len() as u32;
+                    let first = a * WIDTH as u32;
+                    let children = first..(first + WIDTH as u32).min(count);
+                    self.next.extend(children.map(|child| [child, child]));
                 }
-                if level == 1 {
-                    mask &= !sides.a.adjacency.child_pairs([a, b]);
-                }
+            }
+            if level == 1
+                && let Some(own) = sides.own
+            {
+                mask &= !own.child_pairs([a, b]);
             }
             push_lanes([a, b], mask, &mut self.next);
         }
@@ -64,11 +73,12 @@ impl Traversal {
     /// Collects the slot pairs whose boxes meet, of the block pairs of level 0.
     pub(crate) fn collect(
         &mut self,
+        isa: Isa,
         sides: &Sides,
         candidates: &mut Vec<[u32; 2]>,
         cost: &mut Cost,
     ) {
-        self.test(sides, 0, cost);
+        self.test(isa, sides, 0, cost);
         cost.leaf_pairs += self.pairs.len() as u64;
         for (&pair, &mask) in self.pairs.iter().zip(&self.masks) {
             push_lanes(pair, mask, candidates);
@@ -79,16 +89,19 @@ impl Traversal {
     /// node. `range`: of the pairs of its adjacency.
     pub(crate) fn collect_adjacent(
         &mut self,
+        isa: Isa,
         sides: &Sides,
         range: std::ops::Range<usize>,
         candidates: &mut Vec<[u32; 2]>,
         cost: &mut Cost,
     ) {
-        let adjacency = &sides.a.adjacency;
+        let Some(adjacency) = sides.own else {
+            return;
+        };
         let pairs = &adjacency.pairs[range.clone()];
         self.masks.clear();
-        let (blocks, margin) = (sides.a.level(0), sides.margin);
-        sides.isa.run(Overlap { a: blocks, b: blocks, pairs, margin, masks: &mut self.masks });
+        let (a, b, margin) = (sides.a.level(0), sides.b.level(0), sides.margin);
+        isa.run(Overlap { a, b, pairs, margin, masks: &mut self.masks });
         cost.count(pairs.len());
         cost.leaf_pairs += pairs.len() as u64;
         for ((&pair, &mask), &apart) in pairs.iter().zip(&self.masks).zip(&adjacency.apart[range]) {
@@ -96,11 +109,11 @@ impl Traversal {
         }
     }
 
-    fn test(&mut self, sides: &Sides, level: usize, cost: &mut Cost) {
+    fn test(&mut self, isa: Isa, sides: &Sides, level: usize, cost: &mut Cost) {
         let (a, b) = (sides.a.level(level), sides.b.level(level));
         self.masks.clear();
         let (pairs, margin, masks) = (&self.pairs, sides.margin, &mut self.masks);
-        sides.isa.run(Overlap { a, b, pairs, margin, masks });
+        isa.run(Overlap { a, b, pairs, margin, masks });
         cost.count(pairs.len());
     }
 }
