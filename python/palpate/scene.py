@@ -16,7 +16,7 @@ from palpate.mesh import Mesh, as_mesh
 from palpate.model import Body, Model, body_index, read_model
 
 #: Ways to find the touching triangles; all give the same pairs.
-METHODS = ("paper", "all-pairs", "hash")
+METHODS = ("wide", "paper", "all-pairs", "hash")
 
 #: Where a tree node is split along the longest axis of its box.
 SPLITS = ("middle", "count")
@@ -87,9 +87,9 @@ class Scene:
     split : {"middle", "count"}
         Where a box is split along its longest axis: in the middle of its centroids' space, or so
         that both sides hold equally many.
-    method : {"paper", "all-pairs", "hash"}
-        The paper's tree, the double loop over all triangles, or spatial hashing (Teschner et al.
-        2003). All give the same pairs.
+    method : {"wide", "paper", "all-pairs", "hash"}
+        Blocks of eight surface triangles in the tree's order, the paper's tree itself, the double
+        loop over all triangles, or spatial hashing (Teschner et al. 2003). All give the same pairs.
     threads : int
         Worker threads; the result does not depend on it.
 
@@ -107,7 +107,7 @@ class Scene:
         *,
         leaf_size: int | None = None,
         split: str = "middle",
-        method: str = "paper",
+        method: str = "wide",
         threads: int = 1,
     ) -> None:
         meshes, self._names, structure = _scene_parts(bodies)

@@ -93,7 +93,7 @@ class Simulation:
         threads: int = 1,
         leaf_size: int | None = None,
         split: str = "middle",
-        method: str = "paper",
+        method: str = "wide",
     ) -> None:
         if isinstance(model, (str, os.PathLike)):
             model = read_model(model)

@@ -154,6 +154,7 @@ pub(crate) fn scene_options(
         "paper" => Method::Paper,
         "all-pairs" => Method::AllPairs,
         "hash" => Method::Hash,
+        "wide" => Method::Wide,
         other => return Err(PyValueError::new_err(format!("method: unknown {other:?}"))),
     };
     Ok(SceneOptions { leaf_size: leaf_size.unwrap_or(defaults.leaf_size), split, method, threads })
