@@ -14,29 +14,63 @@ use std::time::{Duration, Instant};
 
 use palpate_contact::{DetectionStats, IntersectionOptions, Method, Scene, SceneOptions};
 use palpate_geometry::{Aabb, triangles_intersect, vec3};
-use palpate_model::{Mesh, ReadOptions, read_mesh};
+use palpate_model::{Mesh, MeshData, ReadOptions, read_mesh};
 use parry3d_f64::bounding_volume::Aabb as ParryAabb;
 use parry3d_f64::math::Vector;
 use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy, BvhNode, BvhWorkspace};
 use scenes::{Point, Positions, as_slices, horseshoe, positions};
 
-const FRAMES: usize = 40;
+const FRAMES: usize = 20;
 
 type Failure = Box<dyn std::error::Error>;
 
 fn bodies(set: &str) -> Result<Vec<Arc<Mesh>>, Failure> {
     let Some(folder) = std::env::var_os("PALPATE_DATA") else {
+        if let Some(coarse) = set.strip_suffix("/16") {
+            return Ok(bodies(&format!("{coarse}/4"))?.iter().map(subdivided).collect());
+        } else if let Some(coarse) = set.strip_suffix("/4") {
+            return Ok(bodies(coarse)?.iter().map(subdivided).collect());
+        }
         let size = if set == "paper" { 30 } else { 60 };
         return Ok((0..4).map(|i| horseshoe(size, 8, [5.0 * f64::from(i), 0.0, 0.0])).collect());
     };
     let four = |kind| ["aorta", "kidney_l", "kidney_r", "vena_cava"].map(|o| format!("{o}_{kind}"));
     let names = match set {
         "paper" | "n2500" | "n6250" => four(set).to_vec(),
+        "paper/4" => return Ok(bodies("paper")?.iter().map(subdivided).collect()),
+        "paper/16" => return Ok(bodies("paper/4")?.iter().map(subdivided).collect()),
         name => vec![name.to_owned()],
     };
     let path = |name| PathBuf::from(&folder).join("organs").join(name).with_extension("vtk");
     let read = |name| Ok(Arc::new(read_mesh(&path(name), &ReadOptions::default())?.mesh));
     names.into_iter().map(read).collect()
+}
+
+/// The surface alone, each triangle cut into four.
+fn subdivided(mesh: &Arc<Mesh>) -> Arc<Mesh> {
+    let mut nodes = mesh.nodes().to_vec();
+    let middles = nodes.len() as u32;
+    for &[a, b] in mesh.surface_edges() {
+        nodes.push(vec3::lerp(nodes[a as usize], nodes[b as usize], 0.5));
+    }
+    let mut triangles = Vec::new();
+    for (&[a, b, c], edges) in mesh.triangles().iter().zip(mesh.triangle_edges()) {
+        let [ab, bc, ca] = edges.map(|edge| middles + edge);
+        triangles.extend([[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]);
+    }
+    // Inner nodes belong to no triangle.
+    let mut new = vec![u32::MAX; nodes.len()];
+    let mut data = MeshData::default();
+    for corner in triangles.as_flattened_mut() {
+        let index = &mut new[*corner as usize];
+        if *index == u32::MAX {
+            *index = data.nodes.len() as u32;
+            data.nodes.push(nodes[*corner as usize]);
+        }
+        *corner = *index;
+    }
+    data.triangles = triangles;
+    Arc::new(Mesh::new(data).expect("a subdivided surface is a mesh"))
 }
 
 fn mean_edge(meshes: &[Arc<Mesh>]) -> f64 {
@@ -126,7 +160,9 @@ fn main() -> Result<(), Failure> {
     let mut out = std::io::stdout().lock();
     let sets: Vec<String> = std::env::args().skip(1).collect();
     let sets = if sets.is_empty() {
-        ["paper", "n6250", "ileum_f_n6000", "liver_f_n5000"].map(str::to_owned).to_vec()
+        ["paper", "paper/4", "paper/16", "n6250", "ileum_f_n6000", "liver_f_n5000"]
+            .map(str::to_owned)
+            .to_vec()
     } else {
         sets
     };

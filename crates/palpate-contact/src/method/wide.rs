@@ -1,20 +1,29 @@
 //! The wide layout's method: blocks of eight triangles against each other, level by level.
 
 use std::ops::Range;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use palpate_geometry::{Point, triangles_intersect};
+use rayon::ThreadPool;
 
 use super::{Detector, DistanceOf};
 use crate::leaf_pairs::{BodyPair, Cost, for_each};
 use crate::pairs::{ProximityPair, TrianglePair};
 use crate::proximity::{edge_pair, sort, vertex_triangle};
-use crate::scene::{Frame, IntersectionOptions, Intersections, Proximity, SceneBody};
+use crate::scene::{
+    DetectionStats, Frame, IntersectionOptions, Intersections, Proximity, SceneBody,
+};
 use crate::simd::Isa;
 use crate::wide::{EdgePairs, Reach, SeparateTriangles, Sides, Traversal, VertexPairs, WideBody};
 
-/// Block pairs, and pairs of neighbouring blocks, that one thread takes at a time.
-const PAIRS_PER_TASK: usize = 64;
+/// Block pairs of the upper levels in a task.
+const SEEDS_PER_TASK: usize = 64;
+
+/// Pairs of neighbouring blocks in a task.
+const NEIGHBOURS_PER_TASK: usize = 256;
+
+/// Workers, each with its own buffers, per thread: several, since their work is not equal.
+const WORKERS_PER_THREAD: usize = 8;
 
 /// The bodies in the wide layout, and buffers.
 #[derive(Debug)]
@@ -92,6 +101,8 @@ struct Worker<T> {
     kept: Vec<[u32; 2]>,
     found: Vec<T>,
     cost: Cost,
+    /// Spent until the end of the traversal, and of all.
+    times: [Duration; 2],
 }
 
 impl<T> Default for Worker<T> {
@@ -104,6 +115,7 @@ impl<T> Default for Worker<T> {
             kept: Vec::new(),
             found: Vec::new(),
             cost: Cost::default(),
+            times: [Duration::ZERO; 2],
         }
     }
 }
@@ -137,11 +149,11 @@ impl Wide {
     }
 
     /// Cuts all searches into tasks: without threads one or two each, else of about
-    /// [`PAIRS_PER_TASK`] block pairs.
+    /// [`SEEDS_PER_TASK`] or [`NEIGHBOURS_PER_TASK`] block pairs.
     fn split(&mut self, threads: bool, cost: &mut Cost) {
         self.seeds.clear();
         self.tasks.clear();
-        let chunk = if threads { PAIRS_PER_TASK } else { usize::MAX };
+        let chunk = |size| if threads { size } else { usize::MAX };
         for (index, search) in self.searches.iter().enumerate() {
             let sides = search.sides(&self.bodies);
             let search = index as u32;
@@ -149,17 +161,17 @@ impl Wide {
                 let traversal = &mut self.splitting;
                 traversal.pairs.clear();
                 traversal.pairs.push([0, 0]);
-                while threads && level > 1 && traversal.pairs.len() < PAIRS_PER_TASK {
+                while threads && level > 1 && traversal.pairs.len() < SEEDS_PER_TASK {
                     traversal.descend(self.isa, &sides, level, cost);
                     level -= 1;
                 }
                 let first = self.seeds.len();
                 self.seeds.extend_from_slice(&traversal.pairs);
-                for seeds in chunks(first..self.seeds.len(), chunk) {
+                for seeds in chunks(first..self.seeds.len(), chunk(SEEDS_PER_TASK)) {
                     self.tasks.push(Task { search, part: Part::Blocks { level, seeds } });
                 }
             }
-            for range in chunks(0..sides.adjacent_count(), chunk) {
+            for range in chunks(0..sides.adjacent_count(), chunk(NEIGHBOURS_PER_TASK)) {
                 self.tasks.push(Task { search, part: Part::Adjacent(range) });
             }
         }
@@ -230,18 +242,11 @@ impl Detector for Wide {
         self.split(frame.pool.is_some(), &mut cost);
         let Self { isa, bodies, searches, seeds, tasks, meeting, .. } = self;
         let search = Search { isa: *isa, frame, bodies, searches, seeds, tasks };
-        let workers = search.workers(meeting);
-        for_each(frame.pool, workers, |worker| search.traverse(worker));
-        let traversed = Instant::now();
-        for_each(frame.pool, workers, |worker| search.meeting(worker));
-        for worker in workers.iter() {
-            found.pairs.extend_from_slice(&worker.found);
-            worker.cost.add_to(stats);
-        }
-        cost.add_to(stats);
+        search.run(meeting, Search::meeting, &mut found.pairs, stats, start);
+        let sorting = Instant::now();
         found.pairs.sort_unstable();
-        stats.traversal_time += traversed - start;
-        stats.polygon_time += traversed.elapsed();
+        cost.add_to(stats);
+        stats.polygon_time += sorting.elapsed();
     }
 
     fn proximity(&mut self, frame: &Frame, distance: DistanceOf, found: &mut Proximity) {
@@ -271,18 +276,11 @@ impl Detector for Wide {
         self.split(frame.pool.is_some(), &mut cost);
         let Self { isa, bodies, searches, seeds, tasks, close, .. } = self;
         let search = Search { isa: *isa, frame, bodies, searches, seeds, tasks };
-        let workers = search.workers(close);
-        for_each(frame.pool, workers, |worker| search.traverse(worker));
-        let traversed = Instant::now();
-        for_each(frame.pool, workers, |worker| search.close(worker));
-        for worker in workers.iter() {
-            found.pairs.extend_from_slice(&worker.found);
-            worker.cost.add_to(stats);
-        }
-        cost.add_to(stats);
+        search.run(close, Search::close, &mut found.pairs, stats, start);
+        let sorting = Instant::now();
         sort(&mut found.pairs);
-        stats.traversal_time += traversed - start;
-        stats.polygon_time += traversed.elapsed();
+        cost.add_to(stats);
+        stats.polygon_time += sorting.elapsed();
     }
 }
 
@@ -297,16 +295,43 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// One worker per task when there are threads, else one for all.
-    fn workers<'w, T>(&self, workers: &'w mut Vec<Worker<T>>) -> &'w mut [Worker<T>] {
-        let threads = self.frame.pool.is_some();
-        let count = if threads { self.tasks.len() } else { 1 };
+    /// Traverses and tests, and collects what was found. The wall time since `start` is shared out between
+    /// the two stages as the workers spent it.
+    fn run<T: Copy + Send>(
+        &self,
+        workers: &mut Vec<Worker<T>>,
+        test: impl Fn(&Self, &mut Worker<T>) + Sync,
+        found: &mut Vec<T>,
+        stats: &mut DetectionStats,
+        start: Instant,
+    ) {
+        let threads = self.frame.pool.map_or(1, ThreadPool::current_num_threads);
+        let most = if threads > 1 { WORKERS_PER_THREAD * threads } else { 1 };
+        let count = self.tasks.len().min(most);
         workers.resize_with(workers.len().max(count), Worker::default);
         let workers = &mut workers[..count];
         for (index, worker) in workers.iter_mut().enumerate() {
-            worker.tasks = if threads { [index, index + 1] } else { [0, self.tasks.len()] };
+            worker.tasks = [index, index + 1].map(|end| end * self.tasks.len() / count);
         }
-        workers
+        for_each(self.frame.pool, workers, |worker| {
+            let start = Instant::now();
+            self.traverse(worker);
+            worker.times[0] = start.elapsed();
+            test(self, worker);
+            worker.times[1] = start.elapsed();
+        });
+        let mut times = [Duration::ZERO; 2];
+        for worker in workers.iter() {
+            found.extend_from_slice(&worker.found);
+            worker.cost.add_to(stats);
+            times = [times[0] + worker.times[0], times[1] + worker.times[1]];
+        }
+        let wall = start.elapsed();
+        let whole = times[1].as_secs_f64();
+        let share = if whole > 0.0 { times[0].as_secs_f64() / whole } else { 1.0 };
+        let traversal = wall.mul_f64(share.min(1.0));
+        stats.traversal_time += traversal;
+        stats.polygon_time += wall.saturating_sub(traversal);
     }
 
     /// Collects the slot pairs whose boxes meet.
