@@ -178,8 +178,8 @@ fn collect_tasks(
     tasks.clear();
     for (index, pair) in body_pairs.iter().enumerate() {
         let first = leaves.len();
-        let tree_a = &frame.bodies[pair.a as usize].tree;
-        let bounds_b = frame.bodies[pair.b as usize].tree.bounds();
+        let tree_a = &frame.bodies[pair.a as usize].tree();
+        let bounds_b = frame.bodies[pair.b as usize].tree().bounds();
         let near_b = widened(&bounds_b, pair.margin);
         cost.nodes_visited += tree_a.leaves_meeting(0, &near_b, |leaf| leaves.push(leaf));
         for start in (first..leaves.len()).step_by(LEAVES_PER_TASK) {
@@ -200,14 +200,14 @@ impl<T> Worker<T> {
         leaf_a: u32,
         same_leaf: bool,
     ) {
-        let node = &frame.bodies[pair.a as usize].tree.nodes()[leaf_a as usize];
+        let node = &frame.bodies[pair.a as usize].tree().nodes()[leaf_a as usize];
         let near_a = widened(&node.bounds, pair.margin);
         let start = if pair.is_self() { leaf_a + 1 } else { 0 };
         let [first, last] = node.triangles;
         if pair.is_self() && same_leaf && last - first > 1 {
             self.leaf_pairs.push(LeafPair { body_pair, leaf_a, leaf_b: leaf_a });
         }
-        let tree_b = &frame.bodies[pair.b as usize].tree;
+        let tree_b = &frame.bodies[pair.b as usize].tree();
         let leaf_pairs = &mut self.leaf_pairs;
         self.cost.nodes_visited += tree_b.leaves_meeting(start, &near_a, |leaf_b| {
             leaf_pairs.push(LeafPair { body_pair, leaf_a, leaf_b });
@@ -225,8 +225,8 @@ fn triangle_pairs(
     cost: &mut Cost,
     mut found: impl FnMut([u32; 2], &mut Cost),
 ) {
-    let tree_a = &frame.bodies[pair.a as usize].tree;
-    let tree_b = &frame.bodies[pair.b as usize].tree;
+    let tree_a = &frame.bodies[pair.a as usize].tree();
+    let tree_b = &frame.bodies[pair.b as usize].tree();
     let node_a = &tree_a.nodes()[leaves.leaf_a as usize];
     let node_b = &tree_b.nodes()[leaves.leaf_b as usize];
     let same_leaf = pair.is_self() && leaves.leaf_a == leaves.leaf_b;

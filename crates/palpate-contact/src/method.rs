@@ -8,6 +8,9 @@ mod wide;
 
 use std::fmt::Debug;
 
+use palpate_geometry::Aabb;
+use rayon::ThreadPool;
+
 use crate::scene::{Frame, IntersectionOptions, Intersections, Proximity, SceneBody};
 
 pub(crate) use paper::meeting_triangles;
@@ -51,8 +54,21 @@ pub(crate) trait Detector: Debug + Send + Sync {
     /// Bodies were added, removed or replaced.
     fn bodies_changed(&mut self, _bodies: &[SceneBody]) {}
 
-    /// The bodies are at other positions, their trees refitted. Also called after `bodies_changed`.
-    fn bodies_moved(&mut self, _frame: &Frame) {}
+    /// Whether the bounding trees are needed in every frame; else they are refitted when asked for.
+    fn uses_trees(&self) -> bool {
+        true
+    }
+
+    /// The bodies are at other positions. Also called after `bodies_changed`. Returns the number of tree
+    /// nodes or blocks that were refitted for it.
+    fn bodies_moved(&mut self, _bodies: &[SceneBody], _pool: Option<&ThreadPool>) -> u64 {
+        0
+    }
+
+    /// A box around a body at least as large as its own; `None` where its tree must say.
+    fn bounds(&self, _body: usize) -> Option<Aabb> {
+        None
+    }
 
     fn intersections(
         &mut self,

@@ -152,7 +152,7 @@ impl Worker {
 impl SceneBody {
     /// Whether `point` is strictly inside; never for an open surface.
     pub(crate) fn is_inside(&self, point: &Point) -> bool {
-        self.surface.closed && self.tree.side(&self.positions, point) == Side::Inside
+        self.surface.closed && self.tree().side(&self.positions, point) == Side::Inside
     }
 }
 
@@ -163,7 +163,7 @@ fn way_out(
     node: u32,
     point: Point,
 ) -> Option<PenetratingNode> {
-    let exit = b.tree.closest_point(&b.positions, point, f64::INFINITY)?;
+    let exit = b.tree().closest_point(&b.positions, point, f64::INFINITY)?;
     let depth = exit.distance_squared.sqrt();
     if depth == 0.0 {
         return None;

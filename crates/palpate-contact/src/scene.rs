@@ -1,6 +1,7 @@
 //! The scene: bodies whose nodes move, and what touches what among them.
 
 mod error;
+mod lazy_tree;
 mod results;
 
 use std::sync::Arc;
@@ -18,6 +19,8 @@ use crate::surface::Surface;
 use crate::upper_tree::UpperTree;
 
 pub use crate::method::Method;
+use lazy_tree::LazyTree;
+
 pub use error::SceneError;
 pub use results::{
     ClosestPoint, DetectionStats, Intersections, Penetration, Proximity, UpdateStats,
@@ -63,7 +66,7 @@ impl Default for IntersectionOptions {
 pub(crate) struct SceneBody {
     pub(crate) mesh: Arc<Mesh>,
     pub(crate) positions: Vec<Point>,
-    pub(crate) tree: BoundingTree,
+    tree: LazyTree,
     pub(crate) surface: Surface,
 }
 
@@ -71,7 +74,14 @@ impl SceneBody {
     fn new(mesh: Arc<Mesh>, options: &SceneOptions) -> Self {
         let tree = BoundingTree::new(&mesh, options.leaf_size, options.split);
         let surface = Surface::new(&mesh, tree.triangle_order());
-        Self { positions: mesh.nodes().to_vec(), mesh, tree, surface }
+        let positions = mesh.nodes().to_vec();
+        Self { mesh, positions, tree: LazyTree::new(tree), surface }
+    }
+
+    /// The bounding tree, refitted to the positions.
+    #[inline]
+    pub(crate) fn tree(&self) -> &BoundingTree {
+        self.tree.get(&self.positions)
     }
 
     pub(crate) fn triangle(&self, triangle: u32) -> [Point; 3] {
@@ -216,7 +226,7 @@ impl Scene {
 
     /// A body's bounding tree, refitted to its positions.
     pub fn tree(&self, body: usize) -> &BoundingTree {
-        &self.bodies[body].tree
+        self.bodies[body].tree()
     }
 
     /// How the scene was built.
@@ -224,7 +234,7 @@ impl Scene {
         &self.options
     }
 
-    /// Moves the bodies: refits each bounding tree bottom-up, then the upper tree.
+    /// Moves the bodies: refits what the method searches bottom-up, then the upper tree.
     ///
     /// `positions` \[m\]: for each body one entry per node.
     ///
@@ -249,19 +259,20 @@ impl Scene {
     ) -> Result<UpdateStats, SceneError> {
         let start = Instant::now();
         self.check_positions(&positions)?;
+        let uses_trees = self.detector.uses_trees();
         let move_body = |(index, body): (usize, &mut SceneBody)| {
             body.positions.copy_from_slice(positions(index));
-            body.tree.refit(&body.positions);
+            body.tree.set_moved();
+            if uses_trees {
+                body.tree();
+            }
         };
         if let Some(pool) = &self.pool {
             pool.install(|| self.bodies.par_iter_mut().enumerate().for_each(move_body));
         } else {
             self.bodies.iter_mut().enumerate().for_each(move_body);
         }
-        self.upper.refit(|body| self.bodies[body].tree.bounds());
-        let frame = Frame { bodies: &self.bodies, upper: &self.upper, pool: self.pool.as_ref() };
-        self.detector.bodies_moved(&frame);
-        let nodes_refitted = self.bodies.iter().map(|body| body.tree.nodes().len() as u64).sum();
+        let nodes_refitted = self.bodies_moved();
         Ok(UpdateStats { time: start.elapsed(), nodes_refitted })
     }
 
@@ -312,7 +323,7 @@ impl Scene {
     /// If there is no such body.
     pub fn closest_point(&self, body: usize, point: Point, within: f64) -> Option<ClosestPoint> {
         let body = &self.bodies[body];
-        let found = body.tree.closest_point(&body.positions, point, within)?;
+        let found = body.tree().closest_point(&body.positions, point, within)?;
         let [a, b, c] = body.triangle(found.triangle);
         let [wa, wb, wc] = found.weights;
         Some(ClosestPoint {
@@ -325,10 +336,22 @@ impl Scene {
     }
 
     fn bodies_changed(&mut self) {
-        self.upper.refit(|body| self.bodies[body].tree.bounds());
         self.detector.bodies_changed(&self.bodies);
-        let frame = Frame { bodies: &self.bodies, upper: &self.upper, pool: self.pool.as_ref() };
-        self.detector.bodies_moved(&frame);
+        self.bodies_moved();
+    }
+
+    /// Refits what the method searches and the upper tree; returns the number of tree nodes.
+    fn bodies_moved(&mut self) -> u64 {
+        let Self { bodies, detector, upper, pool, .. } = self;
+        let blocks_refitted = detector.bodies_moved(bodies, pool.as_ref());
+        upper.refit(|body| {
+            let bounds = detector.bounds(body);
+            bounds.unwrap_or_else(|| bodies[body].tree().bounds())
+        });
+        if !detector.uses_trees() {
+            return blocks_refitted;
+        }
+        bodies.iter().map(|body| body.tree().nodes().len() as u64).sum()
     }
 
     fn check_body(&self, body: usize) -> Result<(), SceneError> {

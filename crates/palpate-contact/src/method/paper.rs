@@ -66,7 +66,8 @@ impl Detector for Paper {
                     continue;
                 };
                 let pair = BodyPair::within(a as u32, b as u32, distance, &scene_bounds);
-                if widened(&body_a.tree.bounds(), pair.margin).intersects(&body_b.tree.bounds()) {
+                if widened(&body_a.tree().bounds(), pair.margin).intersects(&body_b.tree().bounds())
+                {
                     body_pairs.push(pair);
                 }
             }
@@ -89,7 +90,7 @@ pub(crate) fn meeting_triangles(
     cost: &mut Cost,
 ) -> Option<TrianglePair> {
     let (a, b) = (&frame.bodies[pair.a as usize], &frame.bodies[pair.b as usize]);
-    let (corners_a, corners_b) = (a.tree.corners(i), b.tree.corners(j));
+    let (corners_a, corners_b) = (a.tree().corners(i), b.tree().corners(j));
     if pair.is_self() && share_a_node(corners_a, corners_b) {
         return None;
     }
@@ -99,8 +100,8 @@ pub(crate) fn meeting_triangles(
     if !triangles_intersect(&points_a, &points_b) {
         return None;
     }
-    let mut triangle_a = a.tree.triangle_order()[i as usize];
-    let mut triangle_b = b.tree.triangle_order()[j as usize];
+    let mut triangle_a = a.tree().triangle_order()[i as usize];
+    let mut triangle_b = b.tree().triangle_order()[j as usize];
     if pair.is_self() && triangle_b < triangle_a {
         std::mem::swap(&mut triangle_a, &mut triangle_b);
     }
@@ -134,14 +135,14 @@ impl<'a> Side<'a> {
             body,
             scene_body,
             position,
-            corners: scene_body.tree.corners(position),
+            corners: scene_body.tree().corners(position),
             owned: scene_body.surface.owned[position as usize],
-            bounds: scene_body.tree.triangle_bounds(position),
+            bounds: scene_body.tree().triangle_bounds(position),
         }
     }
 
     fn triangle(&self) -> u32 {
-        self.scene_body.tree.triangle_order()[self.position as usize]
+        self.scene_body.tree().triangle_order()[self.position as usize]
     }
 
     fn edge_index(&self, edge: &Edge) -> u32 {

@@ -3,8 +3,9 @@
 use std::ops::Range;
 use std::time::{Duration, Instant};
 
-use palpate_geometry::{Point, triangles_intersect};
+use palpate_geometry::{Aabb, Point, triangles_intersect};
 use rayon::ThreadPool;
+use rayon::prelude::*;
 
 use super::{Detector, DistanceOf};
 use crate::leaf_pairs::{BodyPair, Cost, for_each};
@@ -29,6 +30,8 @@ const WORKERS_PER_THREAD: usize = 8;
 #[derive(Debug)]
 pub(super) struct Wide {
     isa: Isa,
+    /// What the boxes are relative to \[m\].
+    origin: Point,
     bodies: Vec<WideBody>,
     objects: Vec<(u32, u32)>,
     searches: Vec<ElementSearch>,
@@ -137,6 +140,7 @@ impl Wide {
     pub(super) fn new(isa: Isa) -> Self {
         Self {
             isa,
+            origin: [0.0; 3],
             bodies: Vec::new(),
             objects: Vec::new(),
             searches: Vec::new(),
@@ -196,22 +200,34 @@ impl Detector for Wide {
         }
     }
 
-    fn bodies_moved(&mut self, frame: &Frame) {
+    fn uses_trees(&self) -> bool {
+        false
+    }
+
+    fn bodies_moved(&mut self, bodies: &[SceneBody], pool: Option<&ThreadPool>) -> u64 {
         // Any point near the bodies: `f32` is fine there.
-        let first = frame.bodies.first().and_then(|body| body.positions.first());
-        let origin: Point = first.copied().unwrap_or_default();
-        let isa = self.isa;
-        let refit =
-            |body: &mut WideBody, moved: &SceneBody| body.refit(isa, &moved.positions, origin);
-        if let Some(pool) = frame.pool {
-            use rayon::prelude::*;
-            let bodies = self.bodies.par_iter_mut().zip(frame.bodies);
-            pool.install(|| bodies.for_each(|(body, moved)| refit(body, moved)));
+        let first = bodies.first().and_then(|body| body.positions.first());
+        self.origin = first.copied().unwrap_or_default();
+        let (isa, origin) = (self.isa, self.origin);
+        let refit = |(packed, body): (&mut WideBody, &SceneBody)| {
+            packed.refit(isa, &body.positions, origin);
+        };
+        if let Some(pool) = pool {
+            pool.install(|| self.bodies.par_iter_mut().zip(bodies).for_each(refit));
         } else {
-            for (body, moved) in self.bodies.iter_mut().zip(frame.bodies) {
-                refit(body, moved);
-            }
+            self.bodies.iter_mut().zip(bodies).for_each(refit);
         }
+        self.bodies.iter().map(|body| body.triangles.block_count()).sum()
+    }
+
+    fn bounds(&self, body: usize) -> Option<Aabb> {
+        let [min, max] = self.bodies[body].triangles.bounds()?;
+        let shifted = |value: f32, axis: usize| f64::from(value) + self.origin[axis];
+        // One step further out: the sum is rounded.
+        Some(Aabb {
+            min: std::array::from_fn(|axis| shifted(min[axis], axis).next_down()),
+            max: std::array::from_fn(|axis| shifted(max[axis], axis).next_up()),
+        })
     }
 
     fn intersections(

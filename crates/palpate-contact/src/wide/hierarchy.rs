@@ -66,10 +66,24 @@ impl Hierarchy {
         self.levels.get(k).map_or(std::slice::from_ref(&self.above), Vec::as_slice)
     }
 
+    /// Number of blocks of all levels.
+    pub(crate) fn block_count(&self) -> u64 {
+        self.levels.iter().map(|level| level.len() as u64).sum()
+    }
+
+    /// Lower and upper corner of a box around everything; `None` where that exceeds `f32`, or nothing is
+    /// there.
+    pub(crate) fn bounds(&self) -> Option<[[f32; 3]; 2]> {
+        let bounds = [self.above.min, self.above.max].map(|side| side.map(|axis| axis[0]));
+        bounds.as_flattened().iter().all(|value| value.abs() < f32::MAX).then_some(bounds)
+    }
+
     /// At least the largest coordinate; infinite where `f32` ends.
     pub(super) fn largest_coordinate(&self) -> f32 {
-        let [min, max] = [self.above.min, self.above.max].map(|side| side.map(|axis| axis[0]));
-        min.iter().chain(&max).fold(0.0, |largest, value| largest.max(value.abs()))
+        let largest = |bounds: [[f32; 3]; 2]| {
+            bounds.as_flattened().iter().fold(0.0, |largest: f32, value| largest.max(value.abs()))
+        };
+        self.bounds().map_or(f32::INFINITY, largest)
     }
 
     pub(super) fn refit(&mut self, isa: Isa, nodes: &[[f32; 4]]) {
