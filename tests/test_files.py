@@ -33,6 +33,17 @@ def test_surfaces_round_trip(tmp_path, cube, extension):
     assert back.volume == pytest.approx(1.0)
 
 
+@pytest.mark.parametrize("version", ["gmsh", "gmsh22"])
+@pytest.mark.parametrize("binary", [False, True])
+def test_gmsh_files_of_both_versions_are_read(tmp_path, cube, version, binary):
+    meshio = pytest.importorskip("meshio")
+    raw = meshio.Mesh(cube.nodes, [("tetra", cube.tetrahedra)])
+    meshio.write(tmp_path / "cube.msh", raw, version, binary=binary)
+    back = palpate.read_mesh(tmp_path / "cube.msh")
+    assert np.array_equal(back.nodes, cube.nodes)
+    assert np.array_equal(back.tetrahedra, cube.tetrahedra)
+
+
 def test_seg_keeps_sets_and_regions_exactly(tmp_path):
     rng = np.random.default_rng(1)
     nodes = CUBE_NODES + 1e-3 * rng.standard_normal((8, 3))
@@ -51,7 +62,8 @@ def test_mixed_cells_are_reported(tmp_path):
         ("line", [[0, 1], [1, 2]]),
     ]
     for name in ("mixed.vtk", "mixed.vtu", "mixed.msh"):
-        meshio.write(tmp_path / name, meshio.Mesh(CUBE_NODES, cells))
+        written_as = "gmsh22" if name.endswith(".msh") else None
+        meshio.write(tmp_path / name, meshio.Mesh(CUBE_NODES, cells), written_as)
         mesh = palpate.read_mesh(tmp_path / name)
         assert len(mesh.tetrahedra) == 5
         notes = " ".join(mesh.notes)

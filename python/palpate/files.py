@@ -22,6 +22,10 @@ CORE_FORMATS = (".seg", ".vtk")
 _TETRAHEDRA = {"tetra": False, "tetra10": True}
 _TRIANGLES = {"triangle": False, "triangle6": True}
 
+#: Where an extension stands for several formats, the one that is written. Gmsh 2.2 is what most
+#: programs read.
+_WRITE_AS = {".msh": "gmsh22"}
+
 
 def read_mesh(path: str | os.PathLike[str], *, repair: bool = False) -> Mesh:
     """Read a mesh; the extension names the format.
@@ -207,7 +211,7 @@ def _write_with_meshio(path: Path, mesh: Mesh) -> None:
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")
-                meshio.write(Path(folder) / path.name, raw)
+                meshio.write(Path(folder) / path.name, raw, _WRITE_AS.get(path.suffix.lower()))
         except SystemExit:
             raise MeshError(f"{path}: meshio cannot write this format", str(path)) from None
         except Exception as error:

@@ -1,8 +1,5 @@
 //! Object data (tetrahedral meshes and their files), the model language and the model it describes.
 
-// `[m]` in the docs is a unit, not a link.
-#![allow(rustdoc::broken_intra_doc_links)]
-
 pub mod body;
 pub mod files;
 pub mod language;

@@ -71,9 +71,7 @@ def organs() -> dict[str, Organ]:
             0.0033,
             sets=lambda x: {"hilum": near(shapes.KIDNEY_HILUM, 0.016)(x)},
         ),
-        "vena_cava": Organ(
-            vena_cava, 2659, 3958, 0.0040, seed=5, sets=vessel_sets(vena_cava)
-        ),
+        "vena_cava": Organ(vena_cava, 2659, 3958, 0.0040, seed=5, sets=vessel_sets(vena_cava)),
         "small": Organ(
             shapes.small,
             300,
@@ -92,9 +90,7 @@ def organs() -> dict[str, Organ]:
 def make(name: str, organ: Organ) -> None:
     """Place nodes, connect, improve, check and write one organ."""
     rng = np.random.default_rng(organ.seed)
-    samples = nodes.sample(
-        organ.shape, np.array(organ.low), np.array(organ.high), organ.edge / 6.0
-    )
+    samples = nodes.sample(organ.shape, np.array(organ.low), np.array(organ.high), organ.edge / 6.0)
     surface_count = organ.triangle_count // 2 + 2  # a closed surface of genus 0
     surface = nodes.surface_nodes(samples, organ.shape, surface_count, rng)
     edge = nodes.mean_spacing(surface)

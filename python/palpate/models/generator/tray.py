@@ -6,7 +6,11 @@ import numpy as np
 
 
 def bowl(
-    radius: float = 0.16, depth: float = 0.05, thickness: float = 0.02, rings: int = 8, sectors: int = 32
+    radius: float = 0.16,
+    depth: float = 0.05,
+    thickness: float = 0.02,
+    rings: int = 8,
+    sectors: int = 32,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Nodes (n, 3) [m] and outward triangles (t, 3); the lowest point of the inside is the origin."""
     angle = 2.0 * np.pi * np.arange(sectors) / sectors
