@@ -18,6 +18,7 @@ use palpate_model::{Mesh, MeshData, ReadOptions, read_mesh};
 use parry3d_f64::bounding_volume::Aabb as ParryAabb;
 use parry3d_f64::math::Vector;
 use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy, BvhNode, BvhWorkspace};
+use rayon::prelude::*;
 use scenes::{Point, Positions, as_slices, horseshoe, positions};
 
 const FRAMES: usize = 20;
@@ -169,6 +170,8 @@ fn main() -> Result<(), Failure> {
     for set in &sets {
         let meshes = bodies(set)?;
         let triangles: usize = meshes.iter().map(|mesh| mesh.triangles().len()).sum();
+        let gain = parallel_gain()?;
+        writeln!(out, "\ntwo threads gain {gain:.2} x on work that shares nothing")?;
         let edge = mean_edge(&meshes);
         let rest = positions(&meshes);
         let diagonal = vec3::norm(Aabb::from_points(rest.iter().flatten()).extent());
@@ -230,6 +233,25 @@ fn measure(
         near.polygon_tests,
     )?;
     Ok(())
+}
+
+/// What two threads gain on work that shares nothing: the machine's own limit at this moment.
+fn parallel_gain() -> Result<f64, Failure> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build()?;
+    let work =
+        |seed: &u64| (0..200_000).fold(*seed as f64, |sum, step| (sum + f64::from(step)).sqrt());
+    let seeds: Vec<u64> = (0..16).collect();
+    let time = |run: &dyn Fn() -> f64| {
+        let once = |_| {
+            let start = Instant::now();
+            std::hint::black_box(run());
+            start.elapsed()
+        };
+        median((0..9).map(once).collect())
+    };
+    let one = time(&|| seeds.iter().map(work).sum());
+    let two = time(&|| pool.install(|| seeds.par_iter().map(work).sum()));
+    Ok(one / two)
 }
 
 fn measure_parry(
