@@ -338,6 +338,11 @@ impl ElasticBody {
         (place != FIXED).then_some(place as usize)
     }
 
+    /// Whether contact forces act in this step.
+    fn touched(&self) -> bool {
+        self.step.response.iter().any(|&d| d != [0.0; 3])
+    }
+
     /// Solves for the response to contact forces [N]; without any it is zero.
     pub(super) fn respond(&mut self, forces: Option<&[Point]>) {
         let Some(forces) = forces else {
@@ -389,11 +394,15 @@ impl ElasticBody {
     }
 
     /// The response to contact turns the body by an amount of second order too much; positions stay,
-    /// or surfaces would overlap, and the velocities are put right, to round-off.
+    /// or surfaces would overlap, and the velocities are put right where that slows the body. Where it
+    /// would not, the positions' own spin stays: a body at rest under its weight, which contact turns
+    /// back in every step, would otherwise keep a velocity that moves nothing.
     fn correct_spin(&self, target: DVec3, x: &[Point], v: &mut [Point]) {
         let now = Inertia::new(&self.masses, x, v);
-        let omega = now.tensor.inverse() * (target - now.spin);
-        if !omega.is_finite() {
+        let inverse = now.tensor.inverse();
+        let omega = inverse * (target - now.spin);
+        let gains_energy = target.dot(inverse * target) > now.spin.dot(inverse * now.spin);
+        if !omega.is_finite() || (self.touched() && gains_energy) {
             return;
         }
         for (v, &x) in v.iter_mut().zip(x) {
