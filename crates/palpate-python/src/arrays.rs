@@ -1,4 +1,4 @@
-//! NumPy arrays in and out. What goes out is a copy and read-only, so it never changes later.
+//! `NumPy` arrays in and out. What goes out is a copy and read-only, so it never changes later.
 
 use numpy::{Element, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods};
 use palpate::geometry::Point;
@@ -76,10 +76,9 @@ pub(crate) fn indices<const N: usize>(rows: &[[i64; N]], name: &str) -> PyResult
 
 /// One index as the core has it, or an error that names the row.
 pub(crate) fn index(entry: i64, name: &str, row: usize) -> PyResult<u32> {
-    match u32::try_from(entry) {
-        Ok(index) if index <= i32::MAX as u32 => Ok(index),
-        _ => Err(PyValueError::new_err(format!(
+    i32::try_from(entry).ok().and_then(|index| u32::try_from(index).ok()).ok_or_else(|| {
+        PyValueError::new_err(format!(
             "{name}: row {row} holds {entry}, expected a node index from 0"
-        ))),
-    }
+        ))
+    })
 }

@@ -37,7 +37,7 @@ impl ToPython for MeshError {
     }
 }
 
-/// An OSError of the right subclass, with errno and file name as Python gives them.
+/// An `OSError` of the right subclass, with errno and file name as Python gives them.
 pub(crate) fn io_error(error: &std::io::Error, path: &std::path::Path) -> PyErr {
     match error.raw_os_error() {
         Some(number) => {

@@ -2,6 +2,9 @@
 //!
 //! No algorithm lives here, and users never import it: `palpate` wraps every class.
 
+// PyO3 hands arguments over by value.
+#![allow(clippy::needless_pass_by_value)]
+
 mod arrays;
 mod errors;
 mod mesh;
@@ -9,11 +12,11 @@ mod model;
 mod scene;
 mod simulation;
 
-use pyo3::prelude::*;
-
 /// The compiled core of palpate.
-#[pymodule]
+#[pyo3::pymodule]
 mod _core {
+    use pyo3::prelude::*;
+
     #[pymodule_export]
     use crate::mesh::{PyMesh, read_mesh_file, write_mesh_file};
     #[pymodule_export]
@@ -22,13 +25,9 @@ mod _core {
     use crate::scene::PyScene;
     #[pymodule_export]
     use crate::simulation::{PySimulation, PySnapshot};
-    #[pymodule_export]
-    const __version__: &str = env!("CARGO_PKG_VERSION");
-
-    use super::*;
 
     #[pymodule_init]
-    fn init(_module: &Bound<'_, PyModule>) -> PyResult<()> {
-        Ok(())
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        module.add("__version__", env!("CARGO_PKG_VERSION"))
     }
 }

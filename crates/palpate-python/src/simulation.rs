@@ -130,7 +130,7 @@ impl PySimulation {
             matrix(py, contacts.iter().map(|c| c.normal).collect())?,
             matrix(py, contacts.iter().map(|c| c.point).collect())?,
             vector(py, contacts.iter().map(|c| c.gap).collect()),
-            matrix(py, contacts.iter().map(|c| c.force()).collect())?,
+            matrix(py, contacts.iter().map(palpate::mechanics::Contact::force).collect())?,
         ))
     }
 
