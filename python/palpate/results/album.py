@@ -62,9 +62,8 @@ class Album:
             files.append(folder / f"{name}.png")
             pictures.save_picture(files[-1], [image], [caption], camera=camera)
         files.append(folder / "strip.png")
-        halves = [image.reshape(480, 2, 640, 2, 3).mean(axis=(1, 3)) for image in images]
         pictures.save_picture(
-            files[-1], [half.astype(np.uint8) for half in halves], captions, camera=camera
+            files[-1], [_half(image) for image in images], captions, camera=camera
         )
         return files
 
@@ -85,6 +84,14 @@ class Album:
             _shape(body, points, marks, colors)
             for body, points, marks in zip(self._model.bodies, positions, touched, strict=True)
         ]
+
+
+def _half(image: pictures.Image) -> pictures.Image:
+    """The image at half its size."""
+    rows, columns = image.shape[0] // 2, image.shape[1] // 2
+    pixels = image[: 2 * rows, : 2 * columns].reshape(rows, 2, columns, 2, 3)
+    half: pictures.Image = pixels.mean(axis=(1, 3)).astype(np.uint8)
+    return half
 
 
 def _shape(body: Body, points: Float64Array, marks: Float64Array, colors: Any) -> pictures.Shape:
