@@ -4,6 +4,7 @@ mod elastic;
 mod element;
 mod frame;
 mod inertia;
+pub(crate) mod turning;
 
 use glam::DVec3;
 use palpate_geometry::Point;
@@ -146,7 +147,12 @@ impl MovingBody {
     /// Makes the compliance columns of `nodes` available.
     pub(crate) fn prepare_compliance(&mut self, nodes: &[u32], step: u64) {
         self.new_columns = match &mut self.kind {
-            BodyKind::Elastic(elastic) => self.compliance.prepare(elastic, nodes, step),
+            BodyKind::Elastic(elastic) => {
+                if !nodes.is_empty() {
+                    elastic.prepare_turning();
+                }
+                self.compliance.prepare(elastic, nodes, step)
+            }
             BodyKind::Rigid { .. } => 0,
         };
     }

@@ -198,6 +198,15 @@ impl Cholesky {
         self.packed.solve_in_place(&self.order.nodes, rhs, workspace);
     }
 
+    /// Solves for three right-hand sides in place, entry `3 * side + k` of each node being
+    /// component k of one; reads the factor once for all. No allocation.
+    ///
+    /// # Panics
+    /// As [`Cholesky::solve_in_place`].
+    pub fn solve_three_in_place(&self, sides: &mut [[f64; 9]], workspace: &mut SolveWorkspace) {
+        self.packed.solve_three_in_place(&self.order.nodes, sides, workspace);
+    }
+
     /// Solves for the three unit forces on `node`: `columns[i][3 * axis + k]` is the displacement
     /// of node i along k under a unit force along `axis`. No allocation.
     ///

@@ -89,6 +89,11 @@ fn grid(n: u32) -> (usize, Vec<[u32; 4]>) {
     ((n * n * n) as usize, cliques)
 }
 
+/// Three right-hand sides of one.
+fn three_sides([x, y, z]: [f64; 3]) -> [f64; 9] {
+    [x, y, z, z, x, y, y, z, -x]
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
@@ -111,6 +116,16 @@ proptest! {
         let mut expected = rhs.as_flattened().to_vec();
         DenseCholesky::default().solve_in_place(&mut to_dense(&matrix), &mut expected).unwrap();
         prop_assert!(largest_difference(sparse.as_flattened(), &expected) < 1e-12);
+
+        let mut sides: Vec<[f64; 9]> = rhs.iter().map(|&r| three_sides(r)).collect();
+        factor.solve_three_in_place(&mut sides, &mut workspace);
+        for side in 0..3 {
+            let of_node = |s: &[f64; 9]| [s[3 * side], s[3 * side + 1], s[3 * side + 2]];
+            let mut alone: Vec<[f64; 3]> = rhs.iter().map(|&r| of_node(&three_sides(r))).collect();
+            factor.solve_in_place(&mut alone, &mut workspace);
+            let column: Vec<[f64; 3]> = sides.iter().map(of_node).collect();
+            prop_assert!(largest_difference(alone.as_flattened(), column.as_flattened()) < 1e-12);
+        }
 
         let node = seed as usize % node_count;
         let mut columns = vec![[0.0; 9]; node_count];

@@ -18,6 +18,7 @@ use palpate_solver::{
 use super::element::{lame_parameters, shape_gradients, stiffness_block};
 use super::frame::best_rotation;
 use super::inertia::{Inertia, RunningInertia};
+use super::turning::Turning;
 use crate::error::MechanicsError;
 
 const FIXED: u32 = u32::MAX;
@@ -54,6 +55,9 @@ struct Step {
     /// Response of the free nodes to contact forces in the frame [m].
     response: Vec<[f64; 3]>,
     columns: Vec<[f64; 9]>,
+    /// How contact forces turn the body in this step, once it is known.
+    turning: Turning,
+    turning_known: bool,
     workspace: SolveWorkspace,
 }
 
@@ -119,6 +123,8 @@ impl ElasticBody {
             correction: vec![[0.0; 3]; free_nodes.len()],
             response: vec![[0.0; 3]; free_nodes.len()],
             columns: vec![[0.0; 9]; free_nodes.len()],
+            turning: Turning::default(),
+            turning_known: false,
             workspace: factor.workspace(),
         };
         Ok(Self {
@@ -164,6 +170,7 @@ impl ElasticBody {
     /// Prediction, then the correction by every force but contact.
     pub(super) fn predict(&mut self, x: &[Point], v: &[Point], forces: &[Point]) {
         let dt = self.time_step;
+        self.step.turning_known = false;
         self.step.start = Inertia::new(&self.masses, x, v);
         if self.is_unattached() {
             self.predict_rigidly(x, v);
@@ -319,6 +326,27 @@ impl ElasticBody {
         self.step.deformation[node as usize].length()
     }
 
+    /// Finds out how contact forces turn the body in this step; nothing if it is attached.
+    pub(super) fn prepare_turning(&mut self) {
+        if !self.is_unattached() || self.step.turning_known {
+            return;
+        }
+        let (center, to_frame) = (self.predicted_center(), self.step.frame.transpose());
+        let step = &mut self.step;
+        let arms = step.positions.iter().map(|&x| to_frame * (x - center));
+        let gain = self.time_step * self.time_step / (1.0 + self.mass_damping * self.time_step);
+        if step.turning.begin(&self.masses, arms, gain) {
+            self.factor.solve_three_in_place(&mut step.turning.loaded, &mut step.workspace);
+            step.turning.finish(&self.masses);
+            step.turning_known = true;
+        }
+    }
+
+    /// How contact forces turn the body in this step; `None` if it is attached.
+    pub(crate) fn turning(&self) -> Option<&Turning> {
+        self.step.turning_known.then_some(&self.step.turning)
+    }
+
     /// Solves for the three unit forces on `node`, which must be free; read the result with
     /// [`ElasticBody::compliance`].
     pub(crate) fn solve_compliance(&mut self, node: u32) {
@@ -353,7 +381,12 @@ impl ElasticBody {
         for (load, &node) in self.step.response.iter_mut().zip(&self.free_nodes) {
             *load = (to_frame * DVec3::from_array(forces[node as usize])).to_array();
         }
+        let turning = self.step.turning_known.then_some(&self.step.turning);
+        let torque = turning.map(|turning| turning.balance(&self.masses, &mut self.step.response));
         self.factor.solve_in_place(&mut self.step.response, &mut self.step.workspace);
+        if let (Some(turning), Some(torque)) = (turning, torque) {
+            turning.turn(&self.masses, torque, &mut self.step.response);
+        }
     }
 
     /// The state after the step.

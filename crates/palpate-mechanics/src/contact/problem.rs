@@ -165,6 +165,11 @@ impl Problem {
                     );
                 }
             }
+            let [first, second] = candidate.bodies;
+            self.turn(&row, candidate, first, &body);
+            if second != first {
+                self.turn(&row, candidate, second, &body);
+            }
             for (other, row) in self.rows.iter().enumerate().skip(col) {
                 let value: f64 = row
                     .places
@@ -180,6 +185,31 @@ impl Problem {
                 let first = part.first as usize;
                 self.displacements[first..first + part.nodes.len()].fill(DVec3::ZERO);
             }
+        }
+    }
+
+    /// Adds the part of a body's displacements under `row` that the columns do not hold.
+    fn turn<'a>(
+        &mut self,
+        row: &Row,
+        candidate: &Candidate,
+        index: u32,
+        body: impl Fn(usize) -> &'a MovingBody,
+    ) {
+        let elastic = body(index as usize).elastic();
+        let Some(turning) = elastic.and_then(crate::body::ElasticBody::turning) else {
+            return;
+        };
+        let corners = (0..4).filter(|&corner| {
+            candidate.bodies[side(candidate.kind, corner)] == index
+                && row.places[corner] as usize != self.place_count
+        });
+        let loads = corners.map(|corner| (candidate.nodes[corner], row.loads[corner]));
+        let coefficients = turning.coefficients(loads);
+        let part = &self.bodies[index as usize];
+        let moved = &mut self.displacements[part.first as usize..];
+        for (moved, &node) in moved.iter_mut().zip(&part.nodes) {
+            *moved += turning.displacement(node, coefficients);
         }
     }
 

@@ -44,6 +44,23 @@ fn resting(mut base: palpate_model::Body) -> World {
     World::new(&model(vec![base, block], GRAVITY), DT, 1)
 }
 
+#[test]
+fn a_deformed_body_at_rest_has_no_velocity() {
+    // A leaning soft block: it rests deformed and lopsided, where the rotations of the rest shape
+    // and those of the deformed one differ most.
+    let lean = |[x, y, z]: [f64; 3]| [x + 0.4 * z, y, z + 0.001];
+    let mesh = box_mesh([5, 4, 6], [0.06, 0.05, 0.09], lean);
+    let mut bodies = vec![rigid("floor", &floor(0.3, 0.0, |x| x)), soft("block", &mesh, 5e3, 0.03)];
+    for body in &mut bodies {
+        body.contact.friction = 0.4;
+    }
+    let mut world = World::new(&model(bodies, GRAVITY), DT, 1);
+    world.run(240);
+    let velocities = world.dynamics.velocities(1);
+    let fastest = velocities.iter().map(|&v| length(v)).fold(0.0, f64::max);
+    assert!(fastest < 1e-5, "{fastest} m/s");
+}
+
 fn assert_supported(world: &mut World) {
     world.run(240);
     let weight = world.mass(1) * GRAVITY;

@@ -140,6 +140,24 @@ impl PackedFactor {
         }
     }
 
+    pub(super) fn solve_three_in_place(
+        &self,
+        order: &[u32],
+        sides: &mut [[f64; 9]],
+        work: &mut SolveWorkspace,
+    ) {
+        assert_eq!(sides.len(), order.len(), "one entry per node");
+        assert_eq!(work.x.len(), 3 * self.size, "workspace of this factor");
+        for (x, &node) in work.x.as_chunks_mut::<9>().0.iter_mut().zip(order) {
+            let side = &sides[node as usize];
+            *x = std::array::from_fn(|entry| side[3 * (entry % 3) + entry / 3]);
+        }
+        pulp::Arch::new().dispatch(Passes::<3> { factor: self, work, first: 0 });
+        for (x, &node) in work.x.as_chunks::<9>().0.iter().zip(order) {
+            sides[node as usize] = std::array::from_fn(|entry| x[3 * (entry % 3) + entry / 3]);
+        }
+    }
+
     pub(super) fn solve_node(
         &self,
         order: &[u32],

@@ -1,0 +1,162 @@
+//! How an unattached body turns under contact forces.
+//!
+//! The stiffness is that of the rest shape, so its null space holds the rotations of the rest shape
+//! and not those of the deformed one: `A^-1 f` gives a deformed body a wrong angular momentum. With
+//! Q the rotations of the body as it is and `S = (Q^T M Q)^-1` the response is instead
+//!
+//! `P = (1 - Q S Q^T M) A^-1 (1 - M Q S Q^T) + k Q S Q^T`, k = dt² / (1 + alpha dt),
+//!
+//! symmetric, positive, and with `Q^T M P = k Q^T`: contact torques change the spin by what they are.
+
+use glam::{DMat3, DVec3};
+
+/// Rotations of one body in its frame and its response to their inertial loads.
+#[derive(Debug, Default)]
+pub(crate) struct Turning {
+    /// Arm of every node about the centre, in the frame [m].
+    arms: Vec<DVec3>,
+    /// S, the inverse inertia [1/(kg m²)].
+    inverse_inertia: DMat3,
+    /// k [s²].
+    gain: f64,
+    /// Z = A^-1 M Q: entry `3 * axis + k` is along k for the rotation about `axis`.
+    pub(super) loaded: Vec<[f64; 9]>,
+    /// `S Q^T M Z S + k S`.
+    both: DMat3,
+}
+
+impl Turning {
+    /// Takes the arms of all nodes about their centre and fills `loaded` with M Q, which the caller
+    /// solves with A before [`Turning::finish`].
+    pub(super) fn begin(
+        &mut self,
+        masses: &[f64],
+        arms: impl Iterator<Item = DVec3>,
+        gain: f64,
+    ) -> bool {
+        self.arms.clear();
+        self.arms.extend(arms);
+        self.gain = gain;
+        let mut inertia = DMat3::ZERO;
+        self.loaded.clear();
+        for (&m, &r) in masses.iter().zip(&self.arms) {
+            let rotations = [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| m * axis.cross(r));
+            self.loaded.push(std::array::from_fn(|entry| rotations[entry / 3][entry % 3]));
+            let [x, y, z] = rotations.map(|mv| r.cross(mv));
+            inertia += DMat3::from_cols(x, y, z);
+        }
+        self.inverse_inertia = inertia.inverse();
+        self.inverse_inertia.is_finite()
+    }
+
+    /// Completes what [`Turning::begin`] began.
+    pub(super) fn finish(&mut self, masses: &[f64]) {
+        let s = self.inverse_inertia;
+        let mut inner = DMat3::ZERO;
+        for ((&m, &r), z) in masses.iter().zip(&self.arms).zip(&self.loaded) {
+            let [x, y, z] = columns(z).map(|column| m * r.cross(column));
+            inner += DMat3::from_cols(x, y, z);
+        }
+        self.both = s * (0.5 * (inner + inner.transpose())) * s + self.gain * s;
+    }
+
+    /// What P adds to the response of A^-1 alone to forces on some nodes: two vectors to hand to
+    /// [`Turning::displacement`].
+    pub(crate) fn coefficients(&self, loads: impl Iterator<Item = (u32, DVec3)>) -> [DVec3; 2] {
+        let (mut torque, mut loaded) = (DVec3::ZERO, DVec3::ZERO);
+        for (node, load) in loads {
+            torque += self.arms[node as usize].cross(load);
+            loaded += DVec3::from_array(
+                columns(&self.loaded[node as usize]).map(|column| column.dot(load)),
+            );
+        }
+        let s = self.inverse_inertia;
+        [self.both * torque - s * loaded, s * torque]
+    }
+
+    /// Displacement of a node that P adds.
+    pub(crate) fn displacement(&self, node: u32, [turn, counter]: [DVec3; 2]) -> DVec3 {
+        let [x, y, z] = columns(&self.loaded[node as usize]);
+        let counter = counter.x * x + counter.y * y + counter.z * z;
+        turn.cross(self.arms[node as usize]) - counter
+    }
+
+    /// Takes the inertial loads of the turn out of `loads`; returns their torque.
+    pub(super) fn balance(&self, masses: &[f64], loads: &mut [[f64; 3]]) -> DVec3 {
+        let pairs = self.arms.iter().zip(&*loads);
+        let torque: DVec3 = pairs.map(|(r, &f)| r.cross(DVec3::from_array(f))).sum();
+        let turn = self.inverse_inertia * torque;
+        for ((&m, r), load) in masses.iter().zip(&self.arms).zip(loads) {
+            *load = (DVec3::from_array(*load) - m * turn.cross(*r)).to_array();
+        }
+        torque
+    }
+
+    /// Replaces the turn in `response` by the one that `torque` causes.
+    pub(super) fn turn(&self, masses: &[f64], torque: DVec3, response: &mut [[f64; 3]]) {
+        let terms = masses.iter().zip(&self.arms).zip(&*response);
+        let moment: DVec3 = terms.map(|((&m, r), &d)| m * r.cross(DVec3::from_array(d))).sum();
+        let turn = self.inverse_inertia * (self.gain * torque - moment);
+        for (r, d) in self.arms.iter().zip(response) {
+            *d = (DVec3::from_array(*d) + turn.cross(*r)).to_array();
+        }
+    }
+}
+
+fn columns(entries: &[f64; 9]) -> [DVec3; 3] {
+    let [a, b, c, d, e, f, g, h, i] = *entries;
+    [DVec3::new(a, b, c), DVec3::new(d, e, f), DVec3::new(g, h, i)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_response_to_forces_is_that_of_its_columns_and_keeps_the_torque() {
+        let masses = [1.0, 2.0, 0.5, 1.5, 0.7];
+        let points =
+            [[0.0, 0.1, 0.2], [1.0, 0.0, 0.3], [0.2, 1.1, 0.0], [0.3, 0.2, 0.9], [0.8, 0.7, 0.6]]
+                .map(DVec3::from_array);
+        let total: f64 = masses.iter().sum();
+        let center = masses.iter().zip(points).map(|(&m, x)| m * x).sum::<DVec3>() / total;
+        let gain = 0.01;
+        // A diagonal matrix stands for A.
+        let softness = [0.01, 0.004, 0.02, 0.005, 0.012];
+        let mut turning = Turning::default();
+        assert!(turning.begin(&masses, points.iter().map(|&x| x - center), gain));
+        for (column, softness) in turning.loaded.iter_mut().zip(softness) {
+            *column = column.map(|value| softness * value);
+        }
+        turning.finish(&masses);
+
+        let loads = [(1_u32, DVec3::new(0.3, -0.2, 0.9)), (3, DVec3::new(-1.0, 0.4, 0.2))];
+        let mut response = vec![[0.0; 3]; 5];
+        for (node, load) in loads {
+            response[node as usize] = load.to_array();
+        }
+        let torque = turning.balance(&masses, &mut response);
+        for (d, softness) in response.iter_mut().zip(softness) {
+            *d = d.map(|value| softness * value);
+        }
+        turning.turn(&masses, torque, &mut response);
+
+        let coefficients = turning.coefficients(loads.into_iter());
+        for node in 0..5_u32 {
+            let mut sum = turning.displacement(node, coefficients);
+            for (loaded, load) in loads {
+                if loaded == node {
+                    sum += softness[node as usize] * load;
+                }
+            }
+            let expected = DVec3::from_array(response[node as usize]);
+            assert!((sum - expected).length() < 1e-15, "{sum} {expected}");
+        }
+        let spin: DVec3 = (0..5)
+            .map(|i| masses[i] * (points[i] - center).cross(DVec3::from_array(response[i])))
+            .sum();
+        let expected: DVec3 =
+            loads.iter().map(|&(i, f)| gain * (points[i as usize] - center).cross(f)).sum();
+        assert!((spin - expected).length() < 1e-15);
+    }
+}
