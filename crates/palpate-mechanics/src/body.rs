@@ -25,6 +25,7 @@ pub(crate) struct MovingBody {
     pub(crate) contact_forces: Vec<Point>,
     /// Positions [m] at the end of this step if nothing touches.
     pub(crate) free_positions: Vec<Point>,
+    expected_positions: Vec<Point>,
     pub(crate) next_positions: Vec<Point>,
     pub(crate) next_velocities: Vec<Point>,
     pub(crate) motion: Motion,
@@ -75,6 +76,7 @@ impl MovingBody {
             forces: zero.clone(),
             contact_forces: zero.clone(),
             free_positions: nodes.to_vec(),
+            expected_positions: nodes.to_vec(),
             next_positions: nodes.to_vec(),
             next_velocities: zero,
             motion: Motion::default(),
@@ -105,35 +107,42 @@ impl MovingBody {
         }
     }
 
+    /// Positions at the end of this step if contact forces stay as they were in the last one.
+    pub(crate) fn expected_positions(&self) -> &[Point] {
+        &self.expected_positions
+    }
+
     /// Moves the body as if alone; `surface` are its surface nodes, `end` the time after the step [s].
     pub(crate) fn predict(&mut self, surface: &[u32], end: f64, time_step: f64) {
         match &mut self.kind {
             BodyKind::Elastic(elastic) => {
                 elastic.predict(&self.positions, &self.velocities, &self.forces);
                 elastic.free_positions(&mut self.free_positions);
+                if self.touched {
+                    elastic.prepare_turning();
+                    elastic.respond(Some(&self.contact_forces));
+                    elastic.end_positions(&self.positions, &mut self.expected_positions);
+                } else {
+                    self.expected_positions.copy_from_slice(&self.free_positions);
+                }
             }
             BodyKind::Rigid { rest, motion } => {
                 let pose = motion.pose(end);
                 for (node, &rest) in self.free_positions.iter_mut().zip(&*rest) {
                     *node = pose.apply(rest);
                 }
+                self.expected_positions.copy_from_slice(&self.free_positions);
             }
         }
         self.motion = self.expected_motion(surface, time_step);
     }
 
-    /// Motion by inertia and gravity: what contact forces held at rest will go on being held, so the
-    /// free motion would look for contacts much too far away.
+    /// How far the surface moves if contact forces stay as they were: without them a body at rest
+    /// would look for contacts much too far away.
     fn expected_motion(&self, surface: &[u32], time_step: f64) -> Motion {
         let displacement = |&node: &u32| {
-            let position = self.positions[node as usize];
-            match &self.kind {
-                BodyKind::Elastic(elastic) => elastic.inertial_displacement(node, position),
-                BodyKind::Rigid { .. } => {
-                    DVec3::from_array(self.free_positions[node as usize])
-                        - DVec3::from_array(position)
-                }
-            }
+            DVec3::from_array(self.expected_positions[node as usize])
+                - DVec3::from_array(self.positions[node as usize])
         };
         let mean = surface.iter().map(displacement).sum::<DVec3>() / surface.len().max(1) as f64;
         let spread = surface.iter().map(|node| (displacement(node) - mean).length());

@@ -3,6 +3,7 @@
 mod active_set;
 pub(crate) mod compliance;
 pub(crate) mod filter;
+pub(crate) mod last_forces;
 pub(crate) mod problem;
 pub(crate) mod response;
 mod surface;

@@ -14,7 +14,7 @@ use crate::contact::response::Response;
 use crate::contact::{Contact, ContactParameters, Surface};
 use crate::energy::{Energy, Momentum};
 use crate::error::MechanicsError;
-use crate::state::{BodyState, State};
+use crate::state::{BodyState, ContactForce, State};
 
 /// Motion margin of a search, in mean edges of the finer deformable surface: contacts farther
 /// ahead are found in a later step, or as penetrations.
@@ -273,9 +273,13 @@ impl Dynamics {
         stats.times.filter = start.elapsed();
 
         for _ in 0..MAX_PASSES {
-            self.solve_contacts(response, &mut stats)?;
+            self.solve_contacts(response, &mut stats);
             let start = Instant::now();
-            self.apply_contact_forces(response.contacts());
+            self.clear_contact_forces();
+            for contact in response.contacts() {
+                let bodies = std::array::from_fn(|corner| contact.body_of(corner));
+                self.add_contact_force(bodies, contact.nodes, contact.weights, contact.force());
+            }
             self.for_each_body(|_, body| body.advance(time_step));
             let missed = response.take_missed(self.body_count(), |body| self.body(body));
             stats.times.advance += start.elapsed();
@@ -290,20 +294,18 @@ impl Dynamics {
         for index in 0..self.body_count() {
             if let Some(node) = self.body(index).first_broken_node() {
                 let what = "the state after the step";
+                self.set_contact_forces(response.last().forces());
                 return Err(MechanicsError::NotFinite { body: index, node, what });
             }
         }
         self.for_each_body(|_, body| body.commit());
+        response.remember();
         self.step += 1;
         Ok(stats)
     }
 
     /// One solve for the contact forces of the candidates.
-    fn solve_contacts(
-        &mut self,
-        response: &mut Response,
-        stats: &mut StepStats,
-    ) -> Result<(), MechanicsError> {
+    fn solve_contacts(&mut self, response: &mut Response, stats: &mut StepStats) {
         let start = Instant::now();
         let step = self.step;
         let problem = response.problem();
@@ -313,15 +315,14 @@ impl Dynamics {
         stats.times.compliance += start.elapsed();
 
         let start = Instant::now();
-        let cost = response.solve(|body| self.body(body)).map_err(MechanicsError::Contact)?;
+        let cost = response.solve(|body| self.body(body));
         stats.iterations += cost.systems;
         stats.newton_iterations += cost.rounds;
         stats.residual = cost.residual;
         stats.times.solve += start.elapsed();
-        Ok(())
     }
 
-    fn apply_contact_forces(&mut self, contacts: &[Contact]) {
+    fn clear_contact_forces(&mut self) {
         for index in 0..self.body_count() {
             let body = self.body_mut(index);
             if body.touched {
@@ -329,15 +330,29 @@ impl Dynamics {
             }
             body.touched = false;
         }
+    }
+
+    fn set_contact_forces(&mut self, contacts: &[ContactForce]) {
+        self.clear_contact_forces();
         for contact in contacts {
-            let force = contact.force();
-            for corner in 0..4 {
-                let body = self.body_mut(contact.body_of(corner));
-                body.touched = true;
-                let sum = &mut body.contact_forces[contact.nodes[corner] as usize];
-                for k in 0..3 {
-                    sum[k] += contact.weights[corner] * force[k];
-                }
+            let bodies = std::array::from_fn(|corner| contact.body_of(corner));
+            self.add_contact_force(bodies, contact.nodes, contact.weights, contact.force);
+        }
+    }
+
+    fn add_contact_force(
+        &mut self,
+        bodies: [usize; 4],
+        nodes: [u32; 4],
+        weights: [f64; 4],
+        force: Point,
+    ) {
+        for corner in 0..4 {
+            let body = self.body_mut(bodies[corner]);
+            body.touched = true;
+            let sum = &mut body.contact_forces[nodes[corner] as usize];
+            for k in 0..3 {
+                sum[k] += weights[corner] * force[k];
             }
         }
     }
@@ -433,10 +448,15 @@ impl Dynamics {
                 forces: body.forces.clone(),
             }
         });
-        State { time: self.time(), step: self.step, bodies: bodies.collect() }
+        State {
+            time: self.time(),
+            step: self.step,
+            bodies: bodies.collect(),
+            contacts: self.response.last().forces().to_vec(),
+        }
     }
 
-    /// Goes back to `state`; contacts and contact forces are cleared.
+    /// Goes back to `state`; [`Dynamics::contacts`] is empty until the next step.
     ///
     /// # Errors
     /// If the state belongs to other bodies or is not finite; nothing has changed then.
@@ -451,14 +471,24 @@ impl Dynamics {
             check_array(body, count, &saved.velocities, "the velocity")?;
             check_array(body, count, &saved.forces, "the force")?;
         }
+        let fits = |contact: &ContactForce| {
+            let corners = (0..4).all(|corner| {
+                let body = contact.body_of(corner);
+                body < expected && (contact.nodes[corner] as usize) < self.positions(body).len()
+            });
+            corners && contact.force.iter().chain(&contact.weights).all(|x| x.is_finite())
+        };
+        if let Some(index) = state.contacts.iter().position(|contact| !fits(contact)) {
+            return Err(MechanicsError::BadContact(index));
+        }
         for (index, saved) in state.bodies.iter().enumerate() {
             let body = self.body_mut(index);
             body.positions.copy_from_slice(&saved.positions);
             body.velocities.copy_from_slice(&saved.velocities);
             body.forces.copy_from_slice(&saved.forces);
-            body.contact_forces.fill([0.0; 3]);
         }
-        self.response.clear_contacts();
+        self.set_contact_forces(&state.contacts);
+        self.response.restore(&state.contacts);
         (self.start_time, self.start_step, self.step) = (state.time, state.step, state.step);
         Ok(())
     }

@@ -88,7 +88,7 @@ pub enum MechanicsError {
         /// Positions, velocities or forces.
         what: &'static str,
     },
-    /// The contact equations have no usable solution.
-    #[error("the contact equations cannot be solved: {0}")]
-    Contact(FactorError),
+    /// A contact of a state that names a body or node that does not exist, or is not finite.
+    #[error("contact {0} of the state does not fit the bodies; is it a state of this model?")]
+    BadContact(usize),
 }

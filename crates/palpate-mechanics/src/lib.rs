@@ -15,4 +15,4 @@ pub use contact::Contact;
 pub use dynamics::{Dynamics, DynamicsOptions, StageTimes, StepStats};
 pub use energy::{Energy, Momentum};
 pub use error::MechanicsError;
-pub use state::{BodyState, State};
+pub use state::{BodyState, ContactForce, State};

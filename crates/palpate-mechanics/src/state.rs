@@ -11,6 +11,30 @@ pub struct State {
     pub step: u64,
     /// The bodies, in model order.
     pub bodies: Vec<BodyState>,
+    /// Contact forces of the last step, where the solver begins.
+    pub contacts: Vec<ContactForce>,
+}
+
+/// The force of one contact in the last step.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Deserialize, serde::Serialize)]
+pub struct ContactForce {
+    /// Whether two edges touch, or else a node and a triangle.
+    pub edges: bool,
+    /// Body of side a and of side b.
+    pub bodies: [u32; 2],
+    /// As in [`crate::Contact`].
+    pub nodes: [u32; 4],
+    /// As in [`crate::Contact`].
+    pub weights: [f64; 4],
+    /// On side a [N].
+    pub force: Point,
+}
+
+impl ContactForce {
+    /// Body of the node in place `corner` of `nodes`.
+    pub(crate) fn body_of(&self, corner: usize) -> usize {
+        self.bodies[usize::from(corner > usize::from(self.edges))] as usize
+    }
 }
 
 /// State of one body; every array has one entry per node.

@@ -8,8 +8,10 @@ pub mod block_matrix;
 pub mod cholesky;
 pub mod dense;
 pub mod ordering;
+pub mod rows;
 
 pub use block_matrix::{BlockMatrix, BlockPattern};
 pub use cholesky::{Cholesky, FactorError, FactorStats, SolveWorkspace};
 pub use dense::DenseCholesky;
 pub use ordering::{NodeOrder, OrderingMethod};
+pub use rows::add_rows;

@@ -311,16 +311,6 @@ impl ElasticBody {
         }
     }
 
-    /// Displacement of a node in this step by inertia and gravity [m].
-    pub(super) fn inertial_displacement(&self, node: u32, position: Point) -> DVec3 {
-        let node = node as usize;
-        if self.free_index[node] == FIXED {
-            return DVec3::ZERO;
-        }
-        self.step.positions[node] - DVec3::from_array(position)
-            + self.time_step * self.time_step * self.gravity
-    }
-
     /// Speed of the deformation at a node [m/s].
     pub(super) fn deformation_speed(&self, node: u32) -> f64 {
         self.step.deformation[node as usize].length()
@@ -389,6 +379,17 @@ impl ElasticBody {
         }
     }
 
+    /// Positions at the end of the step with the response to contact forces.
+    pub(super) fn end_positions(&self, x: &[Point], positions: &mut [Point]) {
+        positions.copy_from_slice(x);
+        let corrections = self.step.correction.iter().zip(&self.step.response);
+        for (&node, (&d, &response)) in self.free_nodes.iter().zip(corrections) {
+            let node = node as usize;
+            let d = self.step.frame * (DVec3::from_array(d) + DVec3::from_array(response));
+            positions[node] = (self.step.positions[node] + d).to_array();
+        }
+    }
+
     /// The state after the step.
     pub(super) fn advance(
         &self,
@@ -398,13 +399,12 @@ impl ElasticBody {
         next_x: &mut [Point],
         next_v: &mut [Point],
     ) {
-        next_x.copy_from_slice(x);
         next_v.fill([0.0; 3]);
+        self.end_positions(x, next_x);
         let corrections = self.step.correction.iter().zip(&self.step.response);
         for (&node, (&d, &response)) in self.free_nodes.iter().zip(corrections) {
             let node = node as usize;
             let d = self.step.frame * (DVec3::from_array(d) + DVec3::from_array(response));
-            next_x[node] = (self.step.positions[node] + d).to_array();
             next_v[node] = (self.step.velocities[node] + d / self.time_step).to_array();
         }
         if self.is_unattached() {

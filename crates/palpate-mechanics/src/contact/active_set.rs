@@ -1,17 +1,23 @@
 //! Which contacts push, and how hard; how much they rub.
 //!
-//! Without friction: Newton's method on a piecewise linear problem: guess which contacts push, solve the linear system
-//! of those, correct the guess from the gaps, until the guess is right.
+//! Block Gauss-Seidel (nonsmooth contact dynamics, Jean 1999) gives contact after contact the force
+//! that its own law asks for, given all others. It soon finds which contacts push, stick and slide,
+//! and takes long to share the load among them. That is a linear system, so conjugate gradients do
+//! it between the sweeps (subspace minimisation, Silcowitz et al. 2010).
 
-use palpate_solver::{DenseCholesky, FactorError};
+use glam::DVec3;
+use palpate_solver::add_rows;
 
 use super::filter::Candidate;
-use super::problem::Problem;
+use super::problem::{Block, Problem};
 
-/// Rounds of the Newton iteration before the fallback.
-const MAX_ROUNDS: usize = 12;
 /// Sweeps of Gauss-Seidel.
-const MAX_SWEEPS: usize = 1_000;
+const MAX_SWEEPS: usize = 300;
+/// Sweeps in a row after the conjugate gradients have led astray.
+const RECOVERY_SWEEPS: usize = 4;
+/// Steps of the conjugate gradients between two sweeps, and how far they reduce the residual.
+const MAX_GRADIENT_STEPS: usize = 40;
+const GRADIENT_REDUCTION: f64 = 1e-2;
 /// Part of the contact distance in which the penalty is soft. Below it, and where the recovery is
 /// limited, a contact is [`HARDENING`] times stiffer: surfaces must not pass through each other even
 /// where all the load is on a few nodes, since an open surface would then push the wrong way.
@@ -20,11 +26,10 @@ const HARDENING: f64 = 100.0;
 /// Smallest softness of an equation relative to its own compliance: keeps the matrix regular.
 const SOFTNESS_FLOOR: f64 = 1e-6;
 /// Sweeps end when no force changes by more than this part of the largest one.
-const SWEEP_TOLERANCE: f64 = 1e-7;
+const SWEEP_TOLERANCE: f64 = 1e-5;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Mode {
-    Off,
     /// Penalty force by the overlap.
     Elastic,
     /// The steeper penalty of a deep overlap.
@@ -33,209 +38,158 @@ enum Mode {
     Recovering,
 }
 
+/// An equation that the conjugate gradients solve: row, softness and target of
+/// `D f + (W f) = s`.
+#[derive(Clone, Copy, Debug)]
+struct Equation {
+    row: u32,
+    softness: f64,
+    target: f64,
+}
+
 /// What a solution took.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct SolveCost {
-    /// Linear systems solved and Gauss-Seidel sweeps done.
+    /// Gauss-Seidel sweeps and steps of the conjugate gradients.
     pub(crate) systems: usize,
-    /// Rounds of guessing.
+    /// Gauss-Seidel sweeps.
     pub(crate) rounds: usize,
-    /// Residual of the last linear system relative to its right-hand side.
+    /// Largest change of a force in the last sweep relative to the largest force.
     pub(crate) residual: f64,
 }
 
 /// Solver of contact problems. Keeps its memory.
 #[derive(Default)]
 pub(crate) struct ActiveSet {
-    modes: Vec<Mode>,
-    next_modes: Vec<Mode>,
     /// Force of each row [N].
     forces: Vec<f64>,
     /// Displacement of each row by all forces [m].
     moved: Vec<f64>,
-    active: Vec<u32>,
-    matrix: Vec<f64>,
-    rhs: Vec<f64>,
-    dense: DenseCholesky,
+    /// Forces and displacements before the conjugate gradients.
+    kept: Vec<f64>,
+    kept_moved: Vec<f64>,
+    equations: Vec<Equation>,
+    rows: Vec<u32>,
+    residual: Vec<f64>,
+    preconditioned: Vec<f64>,
+    direction: Vec<f64>,
+    product: Vec<f64>,
 }
 
 impl ActiveSet {
-    /// Forces of the rows [N].
-    pub(crate) fn forces(&self) -> &[f64] {
-        &self.forces
+    /// Force of a candidate along its axes [N].
+    pub(crate) fn force(&self, block: &Block) -> DVec3 {
+        at(&self.forces, block)
     }
 
-    /// Displacement of a row by all contact forces [m].
-    pub(crate) fn moved(&self, row: usize) -> f64 {
-        self.moved[row]
+    /// Displacement of a candidate along its axes by all contact forces [m].
+    pub(crate) fn moved(&self, block: &Block) -> DVec3 {
+        at(&self.moved, block)
     }
 
-    /// Solves for normal forces: row i is the normal of candidate i.
-    pub(crate) fn solve_normals(
+    /// Solves for the forces of all candidates, beginning with `guess` along their axes.
+    pub(crate) fn solve(
         &mut self,
         problem: &Problem,
         candidates: &[Candidate],
-    ) -> Result<SolveCost, FactorError> {
-        let count = candidates.len();
-        self.reset(count);
-        let mut cost = SolveCost::default();
-        self.next_modes.clear();
-        for row in 0..count {
-            let (mode, _) = normal_law(problem, candidates, row, 0.0);
-            self.next_modes.push(mode);
-        }
-        while self.modes != self.next_modes {
-            if cost.rounds == MAX_ROUNDS {
-                let (sweeps, residual) = self.sweep(problem, candidates, &[]);
-                cost.systems += sweeps;
-                cost.residual = residual;
-                return Ok(cost);
-            }
-            self.modes.clone_from(&self.next_modes);
-            cost.residual = self.solve_active(problem, candidates)?;
-            cost.rounds += 1;
-            cost.systems += usize::from(!self.active.is_empty());
-            for row in 0..count {
-                self.next_modes[row] = normal_law(problem, candidates, row, self.moved[row]).0;
-            }
-        }
-        Ok(cost)
-    }
-
-    /// Solves for normal forces and friction, from the normal forces on: after the normals stand two
-    /// tangents for each candidate in `rubbing`, in that order.
-    ///
-    /// Block Gauss-Seidel (nonsmooth contact dynamics, Jean 1999): contact after contact gets the
-    /// force that its own law asks for, given all others. Slower than guessing sets, but Coulomb's
-    /// law is no minimisation, and sets of sticking and sliding contacts cycle.
-    pub(crate) fn solve_friction(
-        &mut self,
-        problem: &Problem,
-        candidates: &[Candidate],
-        rubbing: &[u32],
+        guess: impl Fn(usize) -> DVec3,
     ) -> SolveCost {
-        self.forces.resize(problem.rows().len(), 0.0);
-        self.moved.resize(problem.rows().len(), 0.0);
-        self.update_moved(problem);
-        let (sweeps, residual) = self.sweep(problem, candidates, rubbing);
-        SolveCost { systems: sweeps, rounds: 1, residual }
+        self.begin(problem, candidates, guess);
+        let mut cost = SolveCost::default();
+        let mut before = f64::INFINITY;
+        let mut plain = 0;
+        while cost.rounds < MAX_SWEEPS {
+            cost.residual = self.sweep(problem, candidates);
+            cost.rounds += 1;
+            cost.systems += 1;
+            if cost.residual <= SWEEP_TOLERANCE {
+                break;
+            }
+            if plain > 0 {
+                plain -= 1;
+                before = f64::INFINITY;
+                continue;
+            }
+            if cost.residual > before {
+                // The gradients led astray: go back to where the last sweep ended.
+                self.forces.clone_from(&self.kept);
+                self.moved.clone_from(&self.kept_moved);
+                plain = RECOVERY_SWEEPS;
+                continue;
+            }
+            before = cost.residual;
+            self.kept.clone_from(&self.forces);
+            self.kept_moved.clone_from(&self.moved);
+            cost.systems += self.improve(problem, candidates);
+        }
+        cost
     }
 
-    fn reset(&mut self, count: usize) {
-        self.modes.clear();
-        self.forces.clear();
-        self.forces.resize(count, 0.0);
-        self.moved.clear();
-        self.moved.resize(count, 0.0);
-    }
-
-    /// Solves the equations of the active rows and clears the other forces.
-    fn solve_active(
+    fn begin(
         &mut self,
         problem: &Problem,
         candidates: &[Candidate],
-    ) -> Result<f64, FactorError> {
-        self.active.clear();
-        for (row, mode) in self.modes.iter().enumerate() {
-            match mode {
-                Mode::Elastic | Mode::Hard | Mode::Recovering => self.active.push(row as u32),
-                Mode::Off => self.forces[row] = 0.0,
-            }
-        }
-        let size = self.active.len();
-        if size > 0 {
-            self.matrix.clear();
-            self.rhs.clear();
-            for (place, &row) in self.active.iter().enumerate() {
-                let row = row as usize;
-                let compliance = problem.compliance_row(row);
-                let (softness, target) = equation(problem, candidates, row, self.modes[row]);
-                self.matrix.extend(self.active.iter().map(|&col| compliance[col as usize]));
-                self.matrix[place * size + place] += softness;
-                self.rhs.push(target);
-            }
-            self.dense.solve_in_place(&mut self.matrix, &mut self.rhs)?;
-            for (&row, &force) in self.active.iter().zip(&self.rhs) {
-                self.forces[row as usize] = force;
-            }
+        guess: impl Fn(usize) -> DVec3,
+    ) {
+        self.forces.clear();
+        for (index, (block, candidate)) in problem.blocks().iter().zip(candidates).enumerate() {
+            let mut force = guess(index);
+            force.x = force.x.max(0.0);
+            let [_, first, second] = force.to_array();
+            let friction = within(candidate.friction * force.x, [first, second]);
+            let force = [force.x, friction[0], friction[1]];
+            self.forces.extend_from_slice(&force[..block.rows as usize]);
         }
         self.update_moved(problem);
-        Ok(self.residual(problem, candidates))
     }
 
     fn update_moved(&mut self, problem: &Problem) {
-        for (row, moved) in self.moved.iter_mut().enumerate() {
-            let pairs = problem.compliance_row(row).iter().zip(&self.forces);
-            *moved = pairs.map(|(w, f)| w * f).sum();
-        }
-    }
-
-    fn residual(&self, problem: &Problem, candidates: &[Candidate]) -> f64 {
-        let (mut worst, mut scale) = (0.0_f64, 0.0_f64);
-        for &row in &self.active {
-            let row = row as usize;
-            let (softness, target) = equation(problem, candidates, row, self.modes[row]);
-            worst = worst.max((softness * self.forces[row] + self.moved[row] - target).abs());
-            scale = scale.max(target.abs());
-        }
-        if scale > 0.0 { worst / scale } else { 0.0 }
-    }
-
-    /// Projected Gauss-Seidel until the forces stay; returns the number of sweeps and the last
-    /// change relative to the largest force.
-    fn sweep(
-        &mut self,
-        problem: &Problem,
-        candidates: &[Candidate],
-        rubbing: &[u32],
-    ) -> (usize, f64) {
-        let normals = candidates.len();
-        let mut relative = 0.0;
-        for sweep in 1..=MAX_SWEEPS {
-            let (mut change, mut largest) = (0.0_f64, 0.0_f64);
-            let mut rubbing = rubbing.iter().enumerate().peekable();
-            for row in 0..normals {
-                let own = problem.compliance_row(row)[row];
-                let others = self.moved[row] - own * self.forces[row];
-                let force_in = |mode| {
-                    let (softness, target) = equation(problem, candidates, row, mode);
-                    (target - others) / (softness + own)
-                };
-                let penalty = force_in(Mode::Elastic).max(force_in(Mode::Hard));
-                let force = penalty.min(force_in(Mode::Recovering)).max(0.0);
-                change = change.max(self.set_force(problem, row, force));
-                largest = largest.max(force);
-                if let Some((place, _)) = rubbing.next_if(|&(_, &other)| other as usize == row) {
-                    let tangents = [normals + 2 * place, normals + 2 * place + 1];
-                    let limit = candidates[row].friction * force;
-                    change = change.max(self.rub(problem, tangents, limit));
-                }
-            }
-            relative = if largest > 0.0 { change / largest } else { 0.0 };
-            if relative <= SWEEP_TOLERANCE {
-                return (sweep, relative);
+        self.moved.clear();
+        self.moved.resize(problem.row_count(), 0.0);
+        self.rows.clear();
+        self.direction.clear();
+        for (row, &force) in self.forces.iter().enumerate() {
+            if force != 0.0 {
+                self.rows.push(row as u32);
+                self.direction.push(force);
             }
         }
-        (MAX_SWEEPS, relative)
+        add_rows(problem.compliance(), &self.rows, &self.direction, &mut self.moved);
+    }
+
+    /// Projected Gauss-Seidel over all contacts; returns the largest change of a force relative to
+    /// the largest force.
+    fn sweep(&mut self, problem: &Problem, candidates: &[Candidate]) -> f64 {
+        let (mut change, mut largest) = (0.0_f64, 0.0_f64);
+        for (block, candidate) in problem.blocks().iter().zip(candidates) {
+            let row = block.first as usize;
+            let own = problem.compliance_row(row)[row];
+            let others = self.moved[row] - own * self.forces[row];
+            let force = normal_force(candidate, block, own, others).0;
+            change = change.max(self.set_force(problem, row, force));
+            largest = largest.max(force);
+            if block.rows == 3 {
+                change = change.max(self.rub(problem, block, candidate.friction * force));
+            }
+        }
+        if largest > 0.0 { change / largest } else { change }
     }
 
     /// Projects a step against the slip onto the disc of the possible friction forces.
-    fn rub(&mut self, problem: &Problem, tangents: [usize; 2], limit: f64) -> f64 {
-        let [first, second] = tangents;
-        let (a, b) = (problem.compliance_row(first)[first], problem.compliance_row(second)[second]);
-        let c = problem.compliance_row(first)[second];
-        // Largest eigenvalue of the contact's own 2x2 block.
-        let stiffest = 0.5 * (a + b) + (0.25 * (a - b) * (a - b) + c * c).sqrt();
+    fn rub(&mut self, problem: &Problem, block: &Block, limit: f64) -> f64 {
+        let rows = [block.first as usize + 1, block.first as usize + 2];
+        if limit == 0.0 {
+            let changes = rows.map(|row| self.set_force(problem, row, 0.0));
+            return changes[0].max(changes[1]);
+        }
+        let stiffest = stiffest(problem, rows);
         if stiffest <= 0.0 {
             return 0.0;
         }
-        let mut force = tangents
-            .map(|row| self.forces[row] - (problem.rows()[row].free + self.moved[row]) / stiffest);
-        let length = force[0].hypot(force[1]);
-        if length > limit {
-            force = force.map(|f| f * limit / length);
-        }
-        let changes = [0, 1].map(|axis| self.set_force(problem, tangents[axis], force[axis]));
+        let slip = [block.free.y + self.moved[rows[0]], block.free.z + self.moved[rows[1]]];
+        let force = [0, 1].map(|axis| self.forces[rows[axis]] - slip[axis] / stiffest);
+        let force = within(limit, force);
+        let changes = [0, 1].map(|axis| self.set_force(problem, rows[axis], force[axis]));
         changes[0].max(changes[1])
     }
 
@@ -244,43 +198,159 @@ impl ActiveSet {
         let change = force - self.forces[row];
         if change != 0.0 {
             self.forces[row] = force;
-            for (moved, w) in self.moved.iter_mut().zip(problem.compliance_row(row)) {
-                *moved += change * w;
-            }
+            add_rows(problem.compliance(), &[row as u32], &[change], &mut self.moved);
         }
         change.abs()
     }
+
+    /// Solves for the forces of the contacts that push or stick, those that slide as they are;
+    /// returns the steps taken.
+    fn improve(&mut self, problem: &Problem, candidates: &[Candidate]) -> usize {
+        self.choose_equations(problem, candidates);
+        let steps = self.descend(problem);
+        for (block, candidate) in problem.blocks().iter().zip(candidates) {
+            let row = block.first as usize;
+            self.forces[row] = self.forces[row].max(0.0);
+            if block.rows == 3 {
+                let limit = candidate.friction * self.forces[row];
+                let force = within(limit, [self.forces[row + 1], self.forces[row + 2]]);
+                self.forces[row + 1..row + 3].copy_from_slice(&force);
+            }
+        }
+        self.update_moved(problem);
+        steps
+    }
+
+    fn choose_equations(&mut self, problem: &Problem, candidates: &[Candidate]) {
+        self.equations.clear();
+        for (block, candidate) in problem.blocks().iter().zip(candidates) {
+            let row = block.first as usize;
+            if self.forces[row] <= 0.0 {
+                continue;
+            }
+            let own = problem.compliance_row(row)[row];
+            let others = self.moved[row] - own * self.forces[row];
+            let (_, mode) = normal_force(candidate, block, own, others);
+            let (softness, target) = equation(candidate, block, own, mode);
+            self.equations.push(Equation { row: row as u32, softness, target });
+            if block.rows == 1 {
+                continue;
+            }
+            let rows = [row + 1, row + 2];
+            let limit = candidate.friction * self.forces[row];
+            let force = rows.map(|row| self.forces[row]);
+            if force[0].hypot(force[1]) < (1.0 - 1e-9) * limit {
+                let softness = SOFTNESS_FLOOR * stiffest(problem, rows);
+                for (row, free) in rows.into_iter().zip([block.free.y, block.free.z]) {
+                    self.equations.push(Equation { row: row as u32, softness, target: -free });
+                }
+            }
+        }
+    }
+
+    /// Preconditioned conjugate gradients on the chosen equations; returns the steps taken.
+    fn descend(&mut self, problem: &Problem) -> usize {
+        let size = self.equations.len();
+        self.rows.clear();
+        self.rows.extend(self.equations.iter().map(|e| e.row));
+        self.residual.clear();
+        self.preconditioned.clear();
+        for e in &self.equations {
+            let row = e.row as usize;
+            self.residual.push(e.target - self.moved[row] - e.softness * self.forces[row]);
+            self.preconditioned.push((e.softness + problem.compliance_row(row)[row]).recip());
+        }
+        self.direction.clear();
+        self.direction.resize(size, 0.0);
+        let weighted = |residual: &[f64], inverse: &[f64]| -> f64 {
+            residual.iter().zip(inverse).map(|(r, d)| r * r * d).sum()
+        };
+        let start = weighted(&self.residual, &self.preconditioned);
+        let mut now = start;
+        let mut last = f64::INFINITY;
+        for step in 0..MAX_GRADIENT_STEPS.min(size) {
+            if now <= GRADIENT_REDUCTION * GRADIENT_REDUCTION * start {
+                return step;
+            }
+            let mix = now / last;
+            let terms = self.direction.iter_mut().zip(&self.residual).zip(&self.preconditioned);
+            for ((direction, r), d) in terms {
+                *direction = r * d + mix * *direction;
+            }
+            self.product.clear();
+            self.product.resize(problem.row_count(), 0.0);
+            add_rows(problem.compliance(), &self.rows, &self.direction, &mut self.product);
+            let curvature: f64 = self
+                .equations
+                .iter()
+                .zip(&self.direction)
+                .map(|(e, p)| p * (self.product[e.row as usize] + e.softness * p))
+                .sum();
+            if curvature <= 0.0 {
+                return step;
+            }
+            let length = now / curvature;
+            let terms = self.equations.iter().zip(&self.direction).zip(&mut self.residual);
+            for ((e, p), residual) in terms {
+                let row = e.row as usize;
+                self.forces[row] += length * p;
+                *residual -= length * (self.product[row] + e.softness * p);
+            }
+            last = now;
+            now = weighted(&self.residual, &self.preconditioned);
+        }
+        MAX_GRADIENT_STEPS.min(size)
+    }
 }
 
-/// Softness D [m/N] and target s [m] of a row's equation `D f + (W f) = s`.
-fn equation(problem: &Problem, candidates: &[Candidate], row: usize, mode: Mode) -> (f64, f64) {
-    let floor = SOFTNESS_FLOOR * problem.compliance_row(row)[row];
-    let equation = &problem.rows()[row];
-    let candidate = &candidates[equation.candidate as usize];
+fn at(values: &[f64], block: &Block) -> DVec3 {
+    let first = block.first as usize;
+    match block.rows {
+        1 => DVec3::new(values[first], 0.0, 0.0),
+        _ => DVec3::from_slice(&values[first..first + 3]),
+    }
+}
+
+/// Largest eigenvalue of the block of W of two rows.
+fn stiffest(problem: &Problem, [first, second]: [usize; 2]) -> f64 {
+    let (a, b) = (problem.compliance_row(first)[first], problem.compliance_row(second)[second]);
+    let c = problem.compliance_row(first)[second];
+    0.5 * (a + b) + (0.25 * (a - b) * (a - b) + c * c).sqrt()
+}
+
+/// `force`, shortened to `limit`.
+fn within(limit: f64, force: [f64; 2]) -> [f64; 2] {
+    let length = force[0].hypot(force[1]);
+    if length > limit { force.map(|f| f * limit / length) } else { force }
+}
+
+/// Softness D [m/N] and target s [m] of a normal's equation `D f + (W f) = s`.
+fn equation(candidate: &Candidate, block: &Block, own: f64, mode: Mode) -> (f64, f64) {
     let hard = HARDENING * candidate.stiffness;
     let soft_part = SOFT_PART * candidate.distance;
     let (stiffness, goal) = match mode {
         Mode::Recovering => (hard, candidate.recovery),
         // Continues the soft law from the end of the soft part on.
         Mode::Hard => (hard, candidate.distance - soft_part + soft_part / HARDENING),
-        Mode::Elastic | Mode::Off => (candidate.stiffness, candidate.distance),
+        Mode::Elastic => (candidate.stiffness, candidate.distance),
     };
-    (stiffness.recip().max(floor), goal - (candidate.gap + equation.free))
+    (stiffness.recip().max(SOFTNESS_FLOOR * own), goal - (candidate.gap + block.free.x))
 }
 
-/// Mode and force of a normal row that all forces have moved by `moved`.
-fn normal_law(problem: &Problem, candidates: &[Candidate], row: usize, moved: f64) -> (Mode, f64) {
+/// Normal force that its law asks for when the other forces move the row by `others`, and the part
+/// of the law that it lies on.
+fn normal_force(candidate: &Candidate, block: &Block, own: f64, others: f64) -> (f64, Mode) {
     let force_in = |mode| {
-        let (softness, target) = equation(problem, candidates, row, mode);
-        (target - moved) / softness
+        let (softness, target) = equation(candidate, block, own, mode);
+        (target - others) / (softness + own)
     };
-    let mut best = (Mode::Elastic, force_in(Mode::Elastic));
+    let mut best = (force_in(Mode::Elastic), Mode::Elastic);
     let (hard, recovering) = (force_in(Mode::Hard), force_in(Mode::Recovering));
-    if hard > best.1 {
-        best = (Mode::Hard, hard);
+    if hard > best.0 {
+        best = (hard, Mode::Hard);
     }
-    if recovering < best.1 {
-        best = (Mode::Recovering, recovering);
+    if recovering < best.0 {
+        best = (recovering, Mode::Recovering);
     }
-    if best.1 > 0.0 { best } else { (Mode::Off, 0.0) }
+    (best.0.max(0.0), best.1)
 }

@@ -1,9 +1,9 @@
 //! The contact problem of a step in the space of contact forces.
 //!
 //! With implicit penalty the step minimises `|x - x_free|²_A / 2 + sum of penalty energies`. Its
-//! dual has one unknown force per contact: `(D + W) lambda = s` over the contacts that push, with
-//! `W = J A^-1 J^T` from compliance columns. It is small and well conditioned however stiff the
-//! penalty is, and forces J^T lambda are equal and opposite exactly, converged or not.
+//! dual has one unknown force per contact and direction: `(D + W) lambda = s` over the contacts that
+//! push, with `W = J P J^T` from compliance columns. It is small and well conditioned however stiff
+//! the penalty is, and forces J^T lambda are equal and opposite exactly, converged or not.
 
 use glam::{DMat3, DVec3};
 use palpate_geometry::Point;
@@ -14,18 +14,20 @@ use crate::body::MovingBody;
 
 const NONE: u32 = u32::MAX;
 
-/// One equation: a candidate's normal or one of its two tangents.
+/// The equations of one candidate: along its normal and, with friction, along two tangents.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Row {
-    pub(crate) candidate: u32,
-    pub(crate) direction: DVec3,
-    /// Relative displacement of the step along the direction without contact forces [m].
-    pub(crate) free: f64,
+pub(crate) struct Block {
+    /// First row.
+    pub(crate) first: u32,
+    /// Rows: 1 or 3.
+    pub(crate) rows: u32,
+    /// Normal and two tangents.
+    pub(crate) axes: DMat3,
+    /// Relative displacement of the step along the axes without contact forces [m].
+    pub(crate) free: DVec3,
     /// Places of the four nodes among all contact nodes; the last place belongs to nodes that
     /// do not give way (fixed or rigid).
     places: [u32; 4],
-    /// Weight times direction in each node's body frame.
-    loads: [DVec3; 4],
 }
 
 /// Nodes of one body that candidates name.
@@ -35,18 +37,19 @@ struct BodyNodes {
     /// Node -> place among all contact nodes.
     places: Vec<u32>,
     first: u32,
-    frame: Option<DMat3>,
 }
 
-/// Rows and compliance of the contact problem. Keeps its memory.
+/// Equations and compliance of the contact problem. Keeps its memory.
 #[derive(Debug, Default)]
 pub(crate) struct Problem {
     bodies: Vec<BodyNodes>,
     place_count: usize,
-    rows: Vec<Row>,
+    blocks: Vec<Block>,
+    row_count: usize,
     /// W, n x n, symmetric, all of it stored.
     compliance: Vec<f64>,
-    displacements: Vec<DVec3>,
+    /// Displacement of every contact node under unit forces along the axes of one candidate.
+    displacements: Vec<DMat3>,
 }
 
 impl Problem {
@@ -64,7 +67,6 @@ impl Problem {
             }
             part.nodes.clear();
             part.places.resize(body(index).positions.len(), NONE);
-            part.frame = body(index).elastic().map(crate::body::ElasticBody::frame);
         }
         for candidate in candidates {
             for corner in 0..4 {
@@ -98,125 +100,131 @@ impl Problem {
         &self.bodies[body].nodes
     }
 
-    pub(crate) fn clear_rows(&mut self) {
-        self.rows.clear();
-    }
-
-    /// Adds the equation of `candidate` along `direction`.
-    pub(crate) fn push_row<'a>(
-        &mut self,
-        index: usize,
-        candidate: &Candidate,
-        direction: DVec3,
-        body: impl Fn(usize) -> &'a MovingBody,
-    ) {
-        let mut row = Row {
-            candidate: index as u32,
-            direction,
-            free: 0.0,
-            places: [self.place_count as u32; 4],
-            loads: [DVec3::ZERO; 4],
-        };
-        row.free = direction.dot(free_displacement(candidate, &body));
-        for corner in 0..4 {
-            let part = &self.bodies[candidate.bodies[side(candidate.kind, corner)] as usize];
-            let place = part.places[candidate.nodes[corner] as usize];
-            if let (Some(frame), true) = (part.frame, place != NONE) {
-                row.places[corner] = place;
-                row.loads[corner] = candidate.weights[corner] * (frame.transpose() * direction);
-            }
-        }
-        self.rows.push(row);
-    }
-
-    pub(crate) fn rows(&self) -> &[Row] {
-        &self.rows
-    }
-
-    /// Fills W for all rows.
+    /// Writes the equations of the candidates and fills W.
     pub(crate) fn assemble<'a>(
         &mut self,
         candidates: &[Candidate],
         body: impl Fn(usize) -> &'a MovingBody,
     ) {
-        let count = self.rows.len();
+        self.blocks.clear();
+        self.row_count = 0;
+        for candidate in candidates {
+            let (first, second) = candidate.normal.any_orthonormal_pair();
+            let axes = DMat3::from_cols(candidate.normal, first, second);
+            let rows = if candidate.friction > 0.0 { 3 } else { 1 };
+            let mut places = [self.place_count as u32; 4];
+            for (corner, own_place) in places.iter_mut().enumerate() {
+                let part = &self.bodies[candidate.bodies[side(candidate.kind, corner)] as usize];
+                let place = part.places[candidate.nodes[corner] as usize];
+                if place != NONE && candidate.weights[corner] != 0.0 {
+                    *own_place = place;
+                }
+            }
+            self.blocks.push(Block {
+                first: self.row_count as u32,
+                rows,
+                axes,
+                free: axes.transpose() * free_displacement(candidate, &body),
+                places,
+            });
+            self.row_count += rows as usize;
+        }
+        let count = self.row_count;
         self.compliance.resize(count * count, 0.0);
         self.displacements.clear();
-        self.displacements.resize(self.place_count + 1, DVec3::ZERO);
-        for col in 0..count {
-            let row = self.rows[col];
-            let candidate = &candidates[row.candidate as usize];
-            for corner in 0..4 {
-                if row.places[corner] as usize == self.place_count {
-                    continue;
-                }
-                let index = candidate.bodies[side(candidate.kind, corner)] as usize;
-                let cache = &body(index).compliance;
-                let column = cache.column(candidate.nodes[corner]).expect("prepared column");
-                let part = &self.bodies[index];
-                let [x, y, z] = row.loads[corner].to_array();
-                let moved = &mut self.displacements[part.first as usize..];
-                for (moved, &node) in moved.iter_mut().zip(&part.nodes) {
-                    let c = column[cache.place(node) as usize].map(f64::from);
-                    *moved += DVec3::new(
-                        c[0] * x + c[3] * y + c[6] * z,
-                        c[1] * x + c[4] * y + c[7] * z,
-                        c[2] * x + c[5] * y + c[8] * z,
-                    );
-                }
-            }
+        self.displacements.resize(self.place_count + 1, DMat3::ZERO);
+        for (col, candidate) in candidates.iter().enumerate() {
+            let block = self.blocks[col];
             let [first, second] = candidate.bodies;
-            self.turn(&row, candidate, first, &body);
+            self.displace(&block, candidate, first, &body);
             if second != first {
-                self.turn(&row, candidate, second, &body);
+                self.displace(&block, candidate, second, &body);
             }
-            for (other, row) in self.rows.iter().enumerate().skip(col) {
-                let value: f64 = row
-                    .places
-                    .iter()
-                    .zip(row.loads)
-                    .map(|(&place, load)| load.dot(self.displacements[place as usize]))
-                    .sum();
-                self.compliance[col * count + other] = value;
-                self.compliance[other * count + col] = value;
+            for (other, row_block) in self.blocks.iter().enumerate().skip(col) {
+                let mut moved = DMat3::ZERO;
+                for (&place, weight) in row_block.places.iter().zip(candidates[other].weights) {
+                    if place as usize != self.place_count {
+                        moved += weight * self.displacements[place as usize];
+                    }
+                }
+                let values = row_block.axes.transpose() * moved;
+                let (from, to) = (block.first as usize, row_block.first as usize);
+                for k in 0..block.rows as usize {
+                    for l in 0..row_block.rows as usize {
+                        let value = values.col(k)[l];
+                        self.compliance[(from + k) * count + to + l] = value;
+                        self.compliance[(to + l) * count + from + k] = value;
+                    }
+                }
             }
             for body in candidate.bodies {
                 let part = &self.bodies[body as usize];
                 let first = part.first as usize;
-                self.displacements[first..first + part.nodes.len()].fill(DVec3::ZERO);
+                self.displacements[first..first + part.nodes.len()].fill(DMat3::ZERO);
             }
         }
     }
 
-    /// Adds the part of a body's displacements under `row` that the columns do not hold.
-    fn turn<'a>(
+    /// Displacements of a body's contact nodes under unit forces along the axes of a candidate.
+    fn displace<'a>(
         &mut self,
-        row: &Row,
+        block: &Block,
         candidate: &Candidate,
         index: u32,
         body: impl Fn(usize) -> &'a MovingBody,
     ) {
-        let elastic = body(index as usize).elastic();
-        let Some(turning) = elastic.and_then(crate::body::ElasticBody::turning) else {
-            return;
-        };
+        let moving = body(index as usize);
+        let Some(elastic) = moving.elastic() else { return };
+        let frame = elastic.frame();
+        let loads = frame.transpose() * block.axes;
+        let part = &self.bodies[index as usize];
+        let moved = &mut self.displacements[part.first as usize..][..part.nodes.len()];
         let corners = (0..4).filter(|&corner| {
             candidate.bodies[side(candidate.kind, corner)] == index
-                && row.places[corner] as usize != self.place_count
+                && block.places[corner] as usize != self.place_count
         });
-        let loads = corners.map(|corner| (candidate.nodes[corner], row.loads[corner]));
-        let coefficients = turning.coefficients(loads);
-        let part = &self.bodies[index as usize];
-        let moved = &mut self.displacements[part.first as usize..];
-        for (moved, &node) in moved.iter_mut().zip(&part.nodes) {
-            *moved += turning.displacement(node, coefficients);
+        for corner in corners.clone() {
+            let cache = &moving.compliance;
+            let column = cache.column(candidate.nodes[corner]).expect("prepared column");
+            let loads = candidate.weights[corner] * loads;
+            for (moved, &node) in moved.iter_mut().zip(&part.nodes) {
+                let entries = column[cache.place(node) as usize].map(f64::from);
+                *moved += DMat3::from_cols_array(&entries) * loads;
+            }
         }
+        if let Some(turning) = elastic.turning() {
+            let coefficients = loads.to_cols_array_2d().map(|load| {
+                let load = DVec3::from_array(load);
+                let loaded =
+                    corners.clone().map(|c| (candidate.nodes[c], candidate.weights[c] * load));
+                turning.coefficients(loaded)
+            });
+            for (moved, &node) in moved.iter_mut().zip(&part.nodes) {
+                let [x, y, z] = coefficients.map(|pair| turning.displacement(node, pair));
+                *moved += DMat3::from_cols(x, y, z);
+            }
+        }
+        for moved in moved {
+            *moved = frame * *moved;
+        }
+    }
+
+    pub(crate) fn blocks(&self) -> &[Block] {
+        &self.blocks
+    }
+
+    pub(crate) fn row_count(&self) -> usize {
+        self.row_count
+    }
+
+    /// W, row after row.
+    pub(crate) fn compliance(&self) -> &[f64] {
+        &self.compliance[..self.row_count * self.row_count]
     }
 
     /// Row `row` of W.
     pub(crate) fn compliance_row(&self, row: usize) -> &[f64] {
-        let count = self.rows.len();
-        &self.compliance[row * count..(row + 1) * count]
+        &self.compliance[row * self.row_count..][..self.row_count]
     }
 }
 
@@ -226,6 +234,14 @@ pub(crate) fn free_displacement<'a>(
     body: impl Fn(usize) -> &'a MovingBody,
 ) -> DVec3 {
     displacement_to(candidate, body, |body| &body.free_positions)
+}
+
+/// Relative displacement of the two sides in the step if contact forces stayed as they were [m].
+pub(crate) fn expected_displacement<'a>(
+    candidate: &Candidate,
+    body: impl Fn(usize) -> &'a MovingBody,
+) -> DVec3 {
+    displacement_to(candidate, body, MovingBody::expected_positions)
 }
 
 /// Relative displacement of the two sides in the step as it was computed last [m].

@@ -2,16 +2,17 @@
 
 use glam::DVec3;
 use palpate_contact::{PenetratingNode, ProximityPair};
-use palpate_solver::FactorError;
 
 use super::Contact;
 use super::active_set::{ActiveSet, SolveCost};
 use super::filter::{BodyView, Candidate, Filter};
-use super::problem::{Problem, free_displacement, step_displacement};
+use super::last_forces::LastForces;
+use super::problem::{Problem, expected_displacement, step_displacement};
 use super::side;
 use crate::body::MovingBody;
+use crate::state::ContactForce;
 
-/// A pair counts when free motion brings it closer than this, in contact distances.
+/// A pair counts when the expected motion brings it closer than this, in contact distances.
 const CLOSE: f64 = 1.5;
 /// A pair that did not count was missed when it ends up closer than this, in contact distances.
 const MISSED: f64 = 0.75;
@@ -21,13 +22,12 @@ const MISSED: f64 = 0.75;
 pub(crate) struct Response {
     filter: Filter,
     candidates: Vec<Candidate>,
-    /// Pairs that free motion does not bring close enough to count.
+    /// Pairs that the expected motion does not bring close enough to count.
     spare: Vec<Candidate>,
     problem: Problem,
     active_set: ActiveSet,
-    /// Candidates with friction that push.
-    rubbing: Vec<u32>,
     contacts: Vec<Contact>,
+    last: LastForces,
 }
 
 impl Response {
@@ -46,7 +46,7 @@ impl Response {
         self.spare.clear();
         let spare = &mut self.spare;
         self.candidates.retain(|candidate| {
-            let moved = candidate.normal.dot(free_displacement(candidate, &body));
+            let moved = candidate.normal.dot(expected_displacement(candidate, &body));
             let close = candidate.gap.min(candidate.gap + moved) < CLOSE * candidate.distance;
             if !close {
                 spare.push(*candidate);
@@ -57,7 +57,7 @@ impl Response {
         self.contacts.clear();
     }
 
-    /// Takes in the pairs that the step brought together although free motion did not; true if
+    /// Takes in the pairs that the step brought together although it was not expected; true if
     /// there are any, so that the forces must be solved again.
     pub(crate) fn take_missed<'a>(
         &mut self,
@@ -94,62 +94,26 @@ impl Response {
         &self.contacts
     }
 
-    pub(crate) fn clear_contacts(&mut self) {
-        self.contacts.clear();
-    }
-
     /// Solves for the forces of the candidates; every compliance column must be prepared.
-    pub(crate) fn solve<'a>(
-        &mut self,
-        body: impl Fn(usize) -> &'a MovingBody,
-    ) -> Result<SolveCost, FactorError> {
+    pub(crate) fn solve<'a>(&mut self, body: impl Fn(usize) -> &'a MovingBody) -> SolveCost {
         if self.candidates.is_empty() {
-            return Ok(SolveCost::default());
-        }
-        self.problem.clear_rows();
-        for (index, candidate) in self.candidates.iter().enumerate() {
-            self.problem.push_row(index, candidate, candidate.normal, &body);
+            return SolveCost::default();
         }
         self.problem.assemble(&self.candidates, &body);
-        let mut cost = self.active_set.solve_normals(&self.problem, &self.candidates)?;
-        self.rubbing.clear();
-        for (index, candidate) in self.candidates.iter().enumerate() {
-            if candidate.friction > 0.0 && self.active_set.forces()[index] > 0.0 {
-                self.rubbing.push(index as u32);
-            }
-        }
-        if !self.rubbing.is_empty() {
-            for &index in &self.rubbing {
-                let candidate = &self.candidates[index as usize];
-                let (first, second) = candidate.normal.any_orthonormal_pair();
-                self.problem.push_row(index as usize, candidate, first, &body);
-                self.problem.push_row(index as usize, candidate, second, &body);
-            }
-            self.problem.assemble(&self.candidates, &body);
-            let more =
-                self.active_set.solve_friction(&self.problem, &self.candidates, &self.rubbing);
-            cost = SolveCost {
-                systems: cost.systems + more.systems,
-                rounds: cost.rounds + more.rounds,
-                residual: more.residual,
-            };
-        }
+        let (problem, candidates, last) = (&self.problem, &self.candidates, &self.last);
+        let guess = |index: usize| {
+            let force = last.force_of(&candidates[index]);
+            problem.blocks()[index].axes.transpose() * force
+        };
+        let cost = self.active_set.solve(problem, candidates, guess);
         self.report(body);
-        Ok(cost)
+        cost
     }
 
     fn report<'a>(&mut self, body: impl Fn(usize) -> &'a MovingBody) {
-        let forces = self.active_set.forces();
-        let normals = self.candidates.len();
-        let mut rubbing = self.rubbing.iter().enumerate().peekable();
-        for (index, candidate) in self.candidates.iter().enumerate() {
-            let mut friction = DVec3::ZERO;
-            if let Some((place, _)) = rubbing.next_if(|&(_, &other)| other as usize == index) {
-                let first = normals + 2 * place;
-                friction = forces[first] * self.problem.rows()[first].direction
-                    + forces[first + 1] * self.problem.rows()[first + 1].direction;
-            }
-            if forces[index] <= 0.0 {
+        for (candidate, block) in self.candidates.iter().zip(self.problem.blocks()) {
+            let force = self.active_set.force(block);
+            if force.x <= 0.0 {
                 continue;
             }
             let mut point = DVec3::ZERO;
@@ -158,7 +122,7 @@ impl Response {
                 let position = moving.positions[candidate.nodes[corner] as usize];
                 point += 0.5 * candidate.weights[corner].abs() * DVec3::from_array(position);
             }
-            let moved = self.problem.rows()[index].free + self.active_set.moved(index);
+            let friction = block.axes * DVec3::new(0.0, force.y, force.z);
             self.contacts.push(Contact {
                 kind: candidate.kind,
                 bodies: candidate.bodies,
@@ -166,10 +130,26 @@ impl Response {
                 weights: candidate.weights,
                 normal: candidate.normal.to_array(),
                 point: point.to_array(),
-                gap: candidate.gap + moved,
-                normal_force: forces[index],
+                gap: candidate.gap + block.free.x + self.active_set.moved(block).x,
+                normal_force: force.x,
                 friction_force: friction.to_array(),
             });
         }
+    }
+
+    /// Keeps the forces of the step that ends for the next one.
+    pub(crate) fn remember(&mut self) {
+        self.last.take(&self.contacts);
+    }
+
+    /// Forces of the last step.
+    pub(crate) fn last(&self) -> &LastForces {
+        &self.last
+    }
+
+    /// Goes back to the forces of another step; no contacts are reported until the next one ends.
+    pub(crate) fn restore(&mut self, forces: &[ContactForce]) {
+        self.contacts.clear();
+        self.last.restore(forces);
     }
 }

@@ -1,6 +1,6 @@
 //! What is refused, and how it is named.
 
-use palpate_mechanics::{Dynamics, DynamicsOptions, MechanicsError};
+use palpate_mechanics::{ContactForce, Dynamics, DynamicsOptions, MechanicsError};
 use palpate_model::Body;
 
 use crate::world::{World, box_mesh, floor, model, soft};
@@ -65,6 +65,16 @@ fn bad_options_and_arrays_are_refused_and_change_nothing() {
         world.dynamics.set_state(&other),
         Err(MechanicsError::WrongBodyCount { expected: 1, found: 0 })
     ));
+    let mut other = before.clone();
+    other.contacts.push(ContactForce {
+        edges: false,
+        bodies: [0, 0],
+        nodes: [0, 1, 2, 8],
+        weights: [1.0, -0.5, -0.25, -0.25],
+        force: [0.0; 3],
+    });
+    let found = world.dynamics.set_state(&other);
+    assert_eq!(found, Err(MechanicsError::BadContact(0)));
     assert_eq!(world.dynamics.state(), before);
 }
 

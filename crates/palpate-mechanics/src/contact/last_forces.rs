@@ -1,0 +1,63 @@
+//! The contact forces of the last step: where the next solve begins and what motion to expect.
+
+use glam::DVec3;
+use palpate_contact::PairKind;
+
+use super::Contact;
+use super::filter::Candidate;
+use crate::state::ContactForce;
+
+/// Contact forces by what touches. Keeps its memory.
+#[derive(Debug, Default)]
+pub(crate) struct LastForces {
+    forces: Vec<ContactForce>,
+    /// Places in `forces`, sorted by what touches.
+    order: Vec<u32>,
+}
+
+/// What tells contacts apart.
+fn key(force: &ContactForce) -> (bool, [u32; 2], [u32; 4]) {
+    (force.edges, force.bodies, force.nodes)
+}
+
+impl LastForces {
+    pub(crate) fn take(&mut self, contacts: &[Contact]) {
+        self.forces.clear();
+        self.forces.extend(contacts.iter().map(|contact| ContactForce {
+            edges: contact.kind == PairKind::EdgeEdge,
+            bodies: contact.bodies,
+            nodes: contact.nodes,
+            weights: contact.weights,
+            force: contact.force(),
+        }));
+        self.sort();
+    }
+
+    pub(crate) fn restore(&mut self, forces: &[ContactForce]) {
+        self.forces.clear();
+        self.forces.extend_from_slice(forces);
+        self.sort();
+    }
+
+    fn sort(&mut self) {
+        self.order.clear();
+        self.order.extend(0..self.forces.len() as u32);
+        let forces = &self.forces;
+        self.order.sort_unstable_by_key(|&place| (key(&forces[place as usize]), place));
+    }
+
+    /// In the order of the contacts.
+    pub(crate) fn forces(&self) -> &[ContactForce] {
+        &self.forces
+    }
+
+    /// Force on side a of a candidate [N]; zero if it did not touch.
+    pub(crate) fn force_of(&self, candidate: &Candidate) -> DVec3 {
+        let wanted = (candidate.kind == PairKind::EdgeEdge, candidate.bodies, candidate.nodes);
+        let place =
+            self.order.binary_search_by_key(&wanted, |&place| key(&self.forces[place as usize]));
+        place.map_or(DVec3::ZERO, |place| {
+            DVec3::from_array(self.forces[self.order[place] as usize].force)
+        })
+    }
+}
