@@ -12,7 +12,7 @@ use super::filter::Candidate;
 use super::problem::{Block, Problem};
 
 /// Sweeps of Gauss-Seidel.
-const MAX_SWEEPS: usize = 300;
+const MAX_SWEEPS: usize = 100;
 /// Sweeps in a row after the conjugate gradients have led astray.
 const RECOVERY_SWEEPS: usize = 4;
 /// Steps of the conjugate gradients between two sweeps, and how far they reduce the residual.
@@ -26,7 +26,7 @@ const HARDENING: f64 = 100.0;
 /// Smallest softness of an equation relative to its own compliance: keeps the matrix regular.
 const SOFTNESS_FLOOR: f64 = 1e-6;
 /// Sweeps end when no force changes by more than this part of the largest one.
-const SWEEP_TOLERANCE: f64 = 1e-5;
+const SWEEP_TOLERANCE: f64 = 1e-4;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Mode {
@@ -39,12 +39,30 @@ enum Mode {
 }
 
 /// An equation that the conjugate gradients solve: row, softness and target of
-/// `D f + (W f) = s`.
+/// `D f + (W f) = s` along a mix of two rows; the second part is zero where one row is meant.
 #[derive(Clone, Copy, Debug)]
 struct Equation {
-    row: u32,
+    rows: [u32; 2],
+    parts: [f64; 2],
     softness: f64,
     target: f64,
+}
+
+impl Equation {
+    fn along_row(row: usize, softness: f64, target: f64) -> Self {
+        Self { rows: [row as u32; 2], parts: [1.0, 0.0], softness, target }
+    }
+
+    fn along(&self, values: &[f64]) -> f64 {
+        self.parts[0] * values[self.rows[0] as usize]
+            + self.parts[1] * values[self.rows[1] as usize]
+    }
+
+    /// W along the mix.
+    fn compliance(&self, problem: &Problem) -> f64 {
+        let [first, second] = self.rows.map(|row| problem.compliance_row(row as usize));
+        self.parts[0] * self.along(first) + self.parts[1] * self.along(second)
+    }
 }
 
 /// What a solution took.
@@ -73,6 +91,7 @@ pub(crate) struct ActiveSet {
     residual: Vec<f64>,
     preconditioned: Vec<f64>,
     direction: Vec<f64>,
+    factors: Vec<f64>,
     product: Vec<f64>,
 }
 
@@ -203,8 +222,8 @@ impl ActiveSet {
         change.abs()
     }
 
-    /// Solves for the forces of the contacts that push or stick, those that slide as they are;
-    /// returns the steps taken.
+    /// Solves for the forces of the contacts that push or stick, and for the direction of the
+    /// friction where they slide; returns the steps taken.
     fn improve(&mut self, problem: &Problem, candidates: &[Candidate]) -> usize {
         self.choose_equations(problem, candidates);
         let steps = self.descend(problem);
@@ -232,7 +251,7 @@ impl ActiveSet {
             let others = self.moved[row] - own * self.forces[row];
             let (_, mode) = normal_force(candidate, block, own, others);
             let (softness, target) = equation(candidate, block, own, mode);
-            self.equations.push(Equation { row: row as u32, softness, target });
+            self.equations.push(Equation::along_row(row, softness, target));
             if block.rows == 1 {
                 continue;
             }
@@ -242,8 +261,19 @@ impl ActiveSet {
             if force[0].hypot(force[1]) < (1.0 - 1e-9) * limit {
                 let softness = SOFTNESS_FLOOR * stiffest(problem, rows);
                 for (row, free) in rows.into_iter().zip([block.free.y, block.free.z]) {
-                    self.equations.push(Equation { row: row as u32, softness, target: -free });
+                    self.equations.push(Equation::along_row(row, softness, -free));
                 }
+            } else if limit > 0.0 {
+                // Friction is opposite to the slip: across it, it resists as `slip / limit`.
+                let parts = [-force[1] / limit, force[0] / limit];
+                let free = [block.free.y, block.free.z];
+                let slip = [free[0] + self.moved[rows[0]], free[1] + self.moved[rows[1]]];
+                self.equations.push(Equation {
+                    rows: rows.map(|row| row as u32),
+                    parts,
+                    softness: slip[0].hypot(slip[1]) / limit,
+                    target: -(parts[0] * free[0] + parts[1] * free[1]),
+                });
             }
         }
     }
@@ -252,13 +282,15 @@ impl ActiveSet {
     fn descend(&mut self, problem: &Problem) -> usize {
         let size = self.equations.len();
         self.rows.clear();
-        self.rows.extend(self.equations.iter().map(|e| e.row));
+        for e in &self.equations {
+            self.rows.extend(e.rows.iter().zip(e.parts).filter(|x| x.1 != 0.0).map(|x| x.0));
+        }
         self.residual.clear();
         self.preconditioned.clear();
         for e in &self.equations {
-            let row = e.row as usize;
-            self.residual.push(e.target - self.moved[row] - e.softness * self.forces[row]);
-            self.preconditioned.push((e.softness + problem.compliance_row(row)[row]).recip());
+            let (moved, force) = (e.along(&self.moved), e.along(&self.forces));
+            self.residual.push(e.target - moved - e.softness * force);
+            self.preconditioned.push((e.softness + e.compliance(problem)).recip());
         }
         self.direction.clear();
         self.direction.resize(size, 0.0);
@@ -279,12 +311,16 @@ impl ActiveSet {
             }
             self.product.clear();
             self.product.resize(problem.row_count(), 0.0);
-            add_rows(problem.compliance(), &self.rows, &self.direction, &mut self.product);
+            self.factors.clear();
+            for (e, p) in self.equations.iter().zip(&self.direction) {
+                self.factors.extend(e.parts.iter().filter(|&&part| part != 0.0).map(|x| x * p));
+            }
+            add_rows(problem.compliance(), &self.rows, &self.factors, &mut self.product);
             let curvature: f64 = self
                 .equations
                 .iter()
                 .zip(&self.direction)
-                .map(|(e, p)| p * (self.product[e.row as usize] + e.softness * p))
+                .map(|(e, p)| p * (e.along(&self.product) + e.softness * p))
                 .sum();
             if curvature <= 0.0 {
                 return step;
@@ -292,9 +328,10 @@ impl ActiveSet {
             let length = now / curvature;
             let terms = self.equations.iter().zip(&self.direction).zip(&mut self.residual);
             for ((e, p), residual) in terms {
-                let row = e.row as usize;
-                self.forces[row] += length * p;
-                *residual -= length * (self.product[row] + e.softness * p);
+                for (&row, part) in e.rows.iter().zip(e.parts) {
+                    self.forces[row as usize] += length * part * p;
+                }
+                *residual -= length * (e.along(&self.product) + e.softness * p);
             }
             last = now;
             now = weighted(&self.residual, &self.preconditioned);
