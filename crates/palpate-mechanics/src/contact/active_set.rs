@@ -12,7 +12,7 @@ use super::filter::Candidate;
 use super::problem::{Block, Problem};
 
 /// Sweeps of Gauss-Seidel.
-const MAX_SWEEPS: usize = 100;
+const MAX_SWEEPS: usize = 50;
 /// Sweeps in a row after the conjugate gradients have led astray.
 const RECOVERY_SWEEPS: usize = 4;
 /// Steps of the conjugate gradients between two sweeps, and how far they reduce the residual.

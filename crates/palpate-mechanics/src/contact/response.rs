@@ -28,6 +28,8 @@ pub(crate) struct Response {
     active_set: ActiveSet,
     contacts: Vec<Contact>,
     last: LastForces,
+    /// Forces found so far in this step, where the solve begins.
+    guess: LastForces,
 }
 
 impl Response {
@@ -53,6 +55,7 @@ impl Response {
             }
             close
         });
+        self.guess.restore(self.last.forces());
         self.problem.collect(&self.candidates, body_count, &body);
         self.contacts.clear();
     }
@@ -77,6 +80,7 @@ impl Response {
         if self.candidates.len() == known {
             return false;
         }
+        self.guess.take(&self.contacts);
         self.problem.collect(&self.candidates, body_count, &body);
         self.contacts.clear();
         true
@@ -100,9 +104,9 @@ impl Response {
             return SolveCost::default();
         }
         self.problem.assemble(&self.candidates, &body);
-        let (problem, candidates, last) = (&self.problem, &self.candidates, &self.last);
+        let (problem, candidates, known) = (&self.problem, &self.candidates, &self.guess);
         let guess = |index: usize| {
-            let force = last.force_of(&candidates[index]);
+            let force = known.force_of(&candidates[index]);
             problem.blocks()[index].axes.transpose() * force
         };
         let cost = self.active_set.solve(problem, candidates, guess);
