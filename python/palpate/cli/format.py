@@ -41,7 +41,10 @@ def format_file(
     if stdout and json_output:
         raise typer.BadParameter("give --stdout or --json")
     path = find_model(model)
-    text = path.read_bytes().decode("utf-8")
+    try:
+        text = path.read_bytes().decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise ValueError(f"{path}: not UTF-8 text (byte {error.start})") from None
     canonical = _core.format_model(text, str(path))
     if stdout:
         sys.stdout.write(canonical)

@@ -18,7 +18,7 @@ import numpy as np
 from palpate import _core
 from palpate.cli.output import console, plain
 from palpate.errors import SimulationError
-from palpate.results.album import Album
+from palpate.results.album import PICTURES, Album
 from palpate.results.atomic import write_bytes
 from palpate.results.frames import FrameSeries
 from palpate.results.record import Record
@@ -51,7 +51,7 @@ class Run:
         self._quiet = quiet
         self.files: dict[str, Path] = {}
         folder.mkdir(parents=True, exist_ok=True)
-        pictures = [folder / "pictures" / f"{name}.png" for name in _PICTURES]
+        pictures = [folder / "pictures" / f"{name}.png" for name in PICTURES]
         for old in [folder / "report.json", *pictures]:
             old.unlink(missing_ok=True)
 
@@ -73,20 +73,21 @@ class Run:
                     failure = str(error)
                     break
                 album.add(simulation)
-                if step % options.every == 0 or step == options.steps or stop:
+                if step % options.every == 0:
                     record.observe(simulation)
                     frames.add(simulation)
                 advance()
                 if stop:
                     break
+            if len(record) % options.every:
+                record.observe(simulation)
+                frames.add(simulation)
             # A second Ctrl-C while these are written must not cut them off.
             frames.finish()
             self.files["frames"] = frames.index
             if options.checkpoint:
                 self.files["checkpoint"] = self._folder / "checkpoint.palpate"
                 simulation.save(self.files["checkpoint"])
-            if options.pictures:
-                self.files["pictures"] = self._draw(album)
             report = {
                 "model": options.model,
                 "options": {**asdict(options), "time_step": simulation.time_step},
@@ -102,13 +103,9 @@ class Run:
             self.files["report"] = self._folder / "report.json"
             text = json.dumps(plain(report), indent=1, allow_nan=False) + "\n"
             write_bytes(self.files["report"], text.encode("utf-8"))
+            if options.pictures:
+                self.files["pictures"] = album.write(self._folder / "pictures")[-1]
         return report
-
-    def _draw(self, album: Album) -> Path:
-        return album.write(self._folder / "pictures")[-1]
-
-
-_PICTURES = ("first", "middle", "last", "strip")
 
 
 def versions() -> dict[str, str]:

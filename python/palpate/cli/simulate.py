@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from palpate import pictures
 from palpate.cli.detect import Method
 from palpate.cli.opening import open_model
 from palpate.cli.output import (
@@ -21,7 +23,6 @@ from palpate.cli.output import (
 )
 from palpate.cli.run import Run, RunOptions
 from palpate.cli.summary import print_summary
-from palpate.errors import SimulationError
 from palpate.model import Model
 from palpate.simulation import Simulation
 
@@ -91,9 +92,11 @@ def simulate(
         leaf_size=leaf_size,
         method=None if method is None else method.value,
         checkpoint=checkpoint,
-        pictures=not no_pictures,
+        pictures=not no_pictures and pictures.available(),
     )
     run = Run(simulation, output, options, quiet=json_output)
+    if not no_pictures and not options.pictures:
+        notes = (*notes, "no pictures without matplotlib: pip install 'palpate[plot]'")
     for note in notes:
         console(error=True).print(f"note: {note}")
     report = run.go()
@@ -103,7 +106,9 @@ def simulate(
         print_summary(report, run.files)
     if report["failure"]:
         at = report["end_time"]
-        raise SimulationError(f"at t = {at:.4g} s: {report['failure']}; results up to then stand")
+        print(f"error: at t = {at:.4g} s: {report['failure']}", file=sys.stderr)
+        print(f"  = note: results up to then are in {output}", file=sys.stderr)
+        raise typer.Exit(1)
     if report["interrupted"]:
         raise typer.Exit(INTERRUPTED)
 

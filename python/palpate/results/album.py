@@ -12,6 +12,9 @@ from palpate._arrays import Float64Array
 from palpate.model import Body, Model
 from palpate.simulation import Simulation
 
+#: Names of the files that an album writes.
+PICTURES = ("first", "middle", "last", "strip")
+
 #: Moments kept in memory at most.
 _KEPT = 33
 
@@ -58,10 +61,10 @@ class Album:
         ]
         captions = [f"t = {time:.2f} s" for time, _, _ in moments]
         files = []
-        for name, image, caption in zip(("first", "middle", "last"), images, captions, strict=True):
+        for name, image, caption in zip(PICTURES[:3], images, captions, strict=True):
             files.append(folder / f"{name}.png")
             pictures.save_picture(files[-1], [image], [caption], camera=camera)
-        files.append(folder / "strip.png")
+        files.append(folder / f"{PICTURES[3]}.png")
         pictures.save_picture(
             files[-1], [_half(image) for image in images], captions, camera=camera
         )

@@ -92,9 +92,9 @@ def data_array(name: str, values: _Array) -> str:
     """A DataArray element: zlib blocks in base64, in the machine's byte order."""
     array = np.ascontiguousarray(values)
     kind = _TYPE_NAMES[array.dtype.str[1:]]
-    columns = 1 if array.ndim == 1 else array.shape[1]
+    columns = "" if array.ndim == 1 else f' NumberOfComponents="{array.shape[1]}"'
     return (
-        f'<DataArray type="{kind}" Name={quoteattr(name)} NumberOfComponents="{columns}" '
+        f'<DataArray type="{kind}" Name={quoteattr(name)}{columns} '
         f'format="binary">\n{_encoded(array.tobytes())}\n</DataArray>'
     )
 
