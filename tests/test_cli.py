@@ -233,6 +233,15 @@ def test_convert_there_and_back(tmp_path, make_box):
     assert len(surface.triangles) == len(mesh.triangles)
 
 
+def test_what_meshio_prints_stays_out_of_the_results(tmp_path, cube):
+    palpate.write_mesh(tmp_path / "a.seg", cube)
+    run("convert", tmp_path / "a.seg", tmp_path / "a.msh")
+    out, _ = run("convert", tmp_path / "a.msh", tmp_path / "b.seg")
+    assert out == f"{tmp_path / 'b.seg'}: 8 nodes, 5 tetrahedra, 12 surface triangles, 1 m³\n"
+    out, _ = run("check", tmp_path / "a.msh", "--json")
+    assert out.startswith("{")
+
+
 def test_convert_of_an_unknown_format_leaves_nothing(tmp_path, cube):
     palpate.write_mesh(tmp_path / "a.seg", cube)
     out, err = run("convert", tmp_path / "a.seg", tmp_path / "a.nonsense", status=1)

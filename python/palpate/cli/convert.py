@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+from contextlib import redirect_stdout
 from pathlib import Path
 from typing import Annotated
 
@@ -26,13 +28,15 @@ def convert(
 
     Example: palpate convert kidney.msh kidney.seg --repair
     """
-    mesh = read_mesh(source, repair=repair)
+    with redirect_stdout(sys.stderr):  # meshio prints while it reads; stdout is for results
+        mesh = read_mesh(source, repair=repair)
     notes = list(mesh.notes)
     if len(mesh.tetrahedra) and target.suffix.lower() in (".stl", ".obj", ".ply", ".off"):
         notes.append(f"{target.suffix} holds surfaces: tetrahedra left out")
     elif target.suffix.lower() != ".seg" and mesh.node_sets:
         notes.append(f"{target.suffix} written without node sets: {', '.join(mesh.node_sets)}")
-    write_mesh(target, mesh)
+    with redirect_stdout(sys.stderr):
+        write_mesh(target, mesh)
     if json_output:
         print_json(
             {

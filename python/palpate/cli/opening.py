@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+from contextlib import redirect_stdout
 from pathlib import Path
 from typing import Any
 
@@ -28,12 +30,13 @@ def is_mesh(name: str) -> bool:
 
 def open_model(name: str, *, repair: bool = False) -> tuple[Model, Path, tuple[str, ...]]:
     """The model, its path and the notes of reading; a mesh becomes a model of one body."""
-    if is_mesh(name):
-        mesh = read_mesh(name, repair=repair)
-        return Model([Body(mesh, name=Path(name).stem)]), Path(name), mesh.notes
-    path = find_model(name)
-    model = read_model(path, repair=repair)
-    return model, path, model.notes
+    with redirect_stdout(sys.stderr):  # meshio prints while it reads; stdout is for results
+        if is_mesh(name):
+            mesh = read_mesh(name, repair=repair)
+            return Model([Body(mesh, name=Path(name).stem)]), Path(name), mesh.notes
+        path = find_model(name)
+        model = read_model(path, repair=repair)
+        return model, path, model.notes
 
 
 def pair_counts(found: Intersections, names: list[str]) -> list[dict[str, Any]]:

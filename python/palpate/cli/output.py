@@ -14,7 +14,7 @@ from typing import Annotated, Any, ParamSpec, TypeVar
 import numpy as np
 import typer
 from rich import box
-from rich.console import Console
+from rich.console import Console, Group
 from rich.table import Table
 from rich.text import Text
 
@@ -119,9 +119,9 @@ def plain(value: Any) -> Any:
     return value
 
 
-def table(title: str, columns: str, rows: Iterable[Sequence[Any]]) -> Table:
+def table(title: str, columns: str, rows: Iterable[Sequence[Any]]) -> Group:
     """A table; ``columns`` are parted by ``|``; those that end in ``<`` are words, else numbers."""
-    result = Table(title=Text(title), title_justify="left", title_style="bold", box=box.SIMPLE_HEAD)
+    result = Table(box=box.SIMPLE_HEAD)
     for name in columns.split("|"):
         words = name.endswith("<")
         result.add_column(
@@ -129,7 +129,8 @@ def table(title: str, columns: str, rows: Iterable[Sequence[Any]]) -> Table:
         )
     for row in rows:
         result.add_row(*(Text(str(each)) for each in row))
-    return result
+    # A title of the table's own would wrap at its width.
+    return Group(Text(title, style="bold"), result)
 
 
 def whole(number: int) -> str:
