@@ -30,6 +30,7 @@ from palpate.scene import Intersections, Scene
 class Method(Enum):
     """How touching triangles are found."""
 
+    WIDE = "wide"
     PAPER = "paper"
     ALL_PAIRS = "all-pairs"
     HASH = "hash"
@@ -40,7 +41,7 @@ MethodOption = Annotated[Method, typer.Option(help="How touching triangles are f
 
 def detect(
     model: ModelArgument,
-    method: MethodOption = Method.PAPER,
+    method: MethodOption = Method.WIDE,
     leaf_size: LeafSizeOption = None,
     threads: ThreadsOption = 1,
     repeat: Annotated[int, typer.Option(min=1, help="Repeats that the times are of.")] = 20,

@@ -132,7 +132,7 @@ def _start(
             time_step=time_step,
             threads=threads,
             leaf_size=leaf_size,
-            method=Method.PAPER.value if method is None else method.value,
+            method=Method.WIDE.value if method is None else method.value,
         )
         return simulation, notes
     simulation = Simulation.load(resume, threads=threads)
