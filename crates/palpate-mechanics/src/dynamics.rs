@@ -454,6 +454,7 @@ impl Dynamics {
         State {
             time: self.time(),
             step: self.step,
+            clock_start: (self.start_time, self.start_step),
             bodies: bodies.collect(),
             contacts: self.response.last().forces().to_vec(),
         }
@@ -492,7 +493,12 @@ impl Dynamics {
         }
         self.set_contact_forces(&state.contacts);
         self.response.restore(&state.contacts);
-        (self.start_time, self.start_step, self.step) = (state.time, state.step, state.step);
+        (self.start_time, self.start_step) = state.clock_start;
+        self.step = state.step;
+        if state.step < self.start_step || self.time() != state.time {
+            // Of another time step: this one counts from here.
+            (self.start_time, self.start_step) = (state.time, state.step);
+        }
         Ok(())
     }
 

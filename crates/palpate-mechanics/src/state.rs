@@ -9,6 +9,9 @@ pub struct State {
     pub time: f64,
     /// Steps taken.
     pub step: u64,
+    /// Time [s] and step that the clock counts from: time is theirs plus steps times the time step,
+    /// so that it does not drift, and a restored simulation goes on with the same bits.
+    pub clock_start: (f64, u64),
     /// The bodies, in model order.
     pub bodies: Vec<BodyState>,
     /// Contact forces of the last step, where the solver begins.

@@ -127,3 +127,27 @@ fn every_damaged_byte_is_noticed() {
         assert!(matches!(Simulation::load(&path, 1), Err(CheckpointError::Unreadable { .. })));
     }
 }
+
+#[test]
+fn a_checkpoint_of_a_moving_path_continues_bit_for_bit() {
+    use palpate::model::{Pose, RigidKey};
+    let mut model = falling_boxes();
+    let key = |time: f64, height: f64| RigidKey {
+        time,
+        translation: glam::DVec3::new(0.0, 0.0, height),
+        rotation: glam::DQuat::from_rotation_z(height * 7.0),
+    };
+    let motion = RigidMotion { keys: vec![key(0.1, 0.0), key(1.0, 0.03)], pivot: [0.0; 3] };
+    assert_ne!(motion.pose(0.5), Pose::IDENTITY);
+    model.bodies[2].rigid = Some(motion);
+    let options = SimulationOptions { time_step: 0.01, ..SimulationOptions::default() };
+    let mut simulation = Simulation::new(model, options).expect("it starts");
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("run.palpate");
+    run(&mut simulation, 29);
+    simulation.save(&path).expect("it is written");
+    let expected = run(&mut simulation, 8);
+    let mut loaded = Simulation::load(&path, 1).expect("it is read");
+    assert_eq!(run(&mut loaded, 8), expected);
+    assert_eq!(loaded.time().to_bits(), simulation.time().to_bits());
+}
