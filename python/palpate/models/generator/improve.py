@@ -13,13 +13,20 @@ import numpy as np
 
 from .nodes import Samples
 from .shapes import Points
-from .tetrahedra import FACES, quality
+from .tetrahedra import FACES, quality, surface_triangles
 
 Tet = tuple[int, int, int, int]
 LONGEST_RING = 7
 # A surface edge may be flipped when its two triangles' normals are this close (cosine).
 FLAT = 0.94
+# A flip of a surface edge must not make a triangle worse than this, unless one was.
+GOOD_TRIANGLE = 0.5
 LEAST_GAIN = 1e-3
+# Weight of the shape of surface triangles (0 to 1) beside the sine of tetrahedra.
+TRIANGLE_WEIGHT = 0.8
+LEAST_ROUNDS, MOST_ROUNDS = 10, 30
+# The smallest sine of a dihedral angle that needs no more work: 23 to 157 degrees.
+FINE = 0.39
 
 
 class Improver:
@@ -152,11 +159,12 @@ class Improver:
         ):
             return False
         x = self.nodes
-        first, second = _normal(x[a], x[p], x[b]), _normal(x[a], x[b], x[q])
-        after = _normal(x[a], x[p], x[q]), _normal(x[b], x[q], x[p])
-        low = min(abs(float(first @ second)), abs(float(after[0] @ after[1])))
-        agree = float(first @ second) > 0 and float(after[0] @ after[1]) > 0
-        return agree and low > FLAT and len(self.around[a]) > 3 and len(self.around[b]) > 3
+        old, new = np.array([(a, p, b), (a, b, q)]), np.array([(a, p, q), (b, q, p)])
+        shape_before, shape_after = triangle_quality(x[old]).min(), triangle_quality(x[new]).min()
+        if shape_after < min(shape_before, GOOD_TRIANGLE):
+            return False
+        aligned = all(float(_normal(*x[s]) @ _normal(*x[t])) > FLAT for s, t in (old, new))
+        return aligned and len(self.around[a]) > 3 and len(self.around[b]) > 3
 
     def remove_face(self, face: Sequence[int]) -> bool:
         """2-3 flip: the face of two tetrahedra gives way to the edge between their far nodes."""
@@ -184,54 +192,91 @@ class Improver:
         return True
 
     def flip(self, bar: float) -> int:
-        """Tries edge and face removal on every tetrahedron below `bar`, worst first."""
+        """Edge and face removal on the tetrahedra below `bar`, worst first, until none gains."""
         count = 0
-        for key in sorted(
-            (k for k, v in self.quality.items() if v < bar), key=lambda k: (self.quality[k], k)
-        ):
-            if key not in self.tets:
-                continue
-            tet = self.tets[key]
-            done = any(self.remove_edge(a, b) for a, b in combinations(sorted(tet), 2))
-            done = done or any(self.remove_face([tet[i] for i in f]) for f in FACES)
-            count += done
+        fresh = {k for k, v in self.quality.items() if v < bar}
+        while fresh:
+            before = self.next_id
+            for key in sorted(fresh, key=lambda k: (self.quality[k], k)):
+                if key in self.tets:
+                    self._flip_one(self.tets[key])
+            made = [k for k in range(before, self.next_id) if k in self.tets]
+            count += len(made)
+            # Only where something changed can another attempt succeed.
+            nodes = {n for k in made for n in self.tets[k]}
+            fresh = {k for n in nodes for k in self.around[n] if self.quality[k] < bar}
         return count
 
-    def smooth(self, bar: float, rng: np.random.Generator) -> int:
-        """Moves each node of a tetrahedron below `bar` to where the worst around it is best; surface nodes slide."""
-        nodes = sorted({n for k, v in self.quality.items() if v < bar for n in self.tets[k]})
-        return sum(self._smooth_node(n, rng) for n in nodes)
+    def _flip_one(self, tet: Tet) -> bool:
+        return any(self.remove_edge(a, b) for a, b in combinations(sorted(tet), 2)) or any(
+            self.remove_face([tet[i] for i in f]) for f in FACES
+        )
 
-    def _smooth_node(self, node: int, rng: np.random.Generator) -> bool:
+    def smooth(self, bar: float, rng: np.random.Generator) -> None:
+        """Moves nodes of elements below `bar` to where the worst around is best; surface nodes slide."""
+        nodes = {n for k, v in self.quality.items() if v < bar for n in self.tets[k]}
+        surface = surface_triangles(self.tetrahedra())
+        poor = TRIANGLE_WEIGHT * triangle_quality(self.nodes[surface]) < bar
+        nodes.update(surface[poor].ravel().tolist())
+        for node in sorted(nodes):
+            self._smooth_node(node, rng)
+
+    def _smooth_node(self, node: int, rng: np.random.Generator) -> None:
         keys = sorted(self.around[node])
         tets = np.array([self.tets[k] for k in keys])
-        corners = self.nodes[tets]
-        at = np.argmax(tets == node, axis=1)
-        rows = np.arange(len(keys))
+        on_surface = node < self.surface_count
+        triangles = self._fan(node, tets) if on_surface else np.empty((0, 3), dtype=np.int64)
         start = self.nodes[node].copy()
-        edge = float(np.median(np.linalg.norm(corners - start, axis=2).max(1)))
-        worst = min(self.quality[k] for k in keys)
-        here, best, step = start, worst, 0.2 * edge
+
+        def worst(trials: Points) -> np.ndarray:
+            value = quality(_moved(self.nodes, tets, node, trials)).min(1)
+            if on_surface:
+                shape = triangle_quality(_moved(self.nodes, triangles, node, trials)).min(1)
+                value = np.minimum(value, TRIANGLE_WEIGHT * shape)
+            return value
+
+        edge = float(np.median(np.linalg.norm(self.nodes[tets] - start, axis=2).max(1)))
+        before = float(worst(start[None])[0])
+        here, best, step = start, before, 0.2 * edge
         for _ in range(7):
             directions = rng.normal(size=(20, 3))
             directions /= np.linalg.norm(directions, axis=1)[:, None]
-            trial = here + step * directions
-            if node < self.surface_count:
-                trial = self.samples.project(trial)
-            moved = np.broadcast_to(corners, (len(trial), *corners.shape)).copy()
-            moved[:, rows, at] = trial[:, None, :]
-            values = quality(moved).min(1)
+            trials = here + step * directions
+            if on_surface:
+                trials = self.samples.project(trials)
+            values = worst(trials)
             top = int(values.argmax())
             if values[top] > best:
-                here, best = trial[top], float(values[top])
+                here, best = trials[top], float(values[top])
             else:
                 step *= 0.5
-        if best <= worst + 1e-5:
-            return False
+        if best <= before + 1e-5:
+            return
         self.nodes[node] = here
         for key, value in zip(keys, quality(self.nodes[tets]).tolist(), strict=True):
             self.quality[key] = value
-        return True
+
+    def _fan(self, node: int, tets: np.ndarray) -> np.ndarray:
+        """Surface triangles around a surface node: the faces that only one tetrahedron has."""
+        faces = np.sort(tets[:, FACES].reshape(-1, 3), axis=1)
+        unique, counts = np.unique(faces[(faces == node).any(1)], axis=0, return_counts=True)
+        return unique[counts == 1]
+
+
+def _moved(nodes: Points, elements: np.ndarray, node: int, trials: Points) -> np.ndarray:
+    """Corners of the elements for each trial position of `node`, (trials, elements, corners, 3)."""
+    corners = nodes[elements]
+    moved = np.broadcast_to(corners, (len(trials), *corners.shape)).copy()
+    moved[:, np.arange(len(elements)), np.argmax(elements == node, axis=1)] = trials[:, None, :]
+    return moved
+
+
+def triangle_quality(corners: np.ndarray) -> np.ndarray:
+    """(..., 3, 3) -> (...): 4 sqrt(3) area / sum of squared sides; 1 when equilateral."""
+    a, b, c = (corners[..., k, :] for k in range(3))
+    area = np.sqrt((np.cross(b - a, c - a) ** 2).sum(-1)) / 2.0
+    squares = ((b - a) ** 2).sum(-1) + ((c - b) ** 2).sum(-1) + ((a - c) ** 2).sum(-1)
+    return 4.0 * math.sqrt(3.0) * area / np.maximum(squares, 1e-30)
 
 
 def _odd(order: tuple[int, int, int, int]) -> bool:
@@ -244,19 +289,15 @@ def _normal(a: Points, b: Points, c: Points) -> Points:
 
 
 def improve(
-    nodes: Points,
-    tetrahedra: np.ndarray,
-    surface_count: int,
-    samples: Samples,
-    seed: int,
-    rounds: int = 12,
+    nodes: Points, tetrahedra: np.ndarray, surface_count: int, samples: Samples, seed: int
 ) -> tuple[Points, np.ndarray]:
-    """Alternates flips and smoothing, with a rising bar, until little changes."""
+    """Alternates flips and smoothing with a rising bar until the worst tetrahedron is fine."""
     work = Improver(nodes, tetrahedra, surface_count, samples)
     rng = np.random.default_rng(seed)
-    for turn in range(rounds):
+    for turn in range(MOST_ROUNDS):
         bar = min(0.35 + 0.03 * turn, 0.55)
-        while work.flip(bar) > 0:
-            pass
+        work.flip(bar)
         work.smooth(bar, rng)
+        if turn >= LEAST_ROUNDS and min(work.quality.values()) > FINE:
+            break
     return work.nodes, work.tetrahedra()

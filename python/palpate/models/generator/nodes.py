@@ -46,6 +46,15 @@ class Samples:
         return x - ((x - self.surface[nearest]) * n).sum(1)[:, None] * n
 
 
+def surface_area(shape: Shape, low: Points, high: Points, spacing: float = 0.002) -> float:
+    """About the area [m^2]: the volume of a thin shell over its thickness."""
+    axes = [np.arange(a - spacing, b + spacing, spacing) for a, b in zip(low, high, strict=True)]
+    x = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    x = x[np.abs(shape(x)) < 4.0 * spacing]
+    distance = shape(x) / np.linalg.norm(gradient(shape, x), axis=1)
+    return float((np.abs(distance) < 0.75 * spacing).sum() * spacing**3 / (1.5 * spacing))
+
+
 def sample(shape: Shape, low: Points, high: Points, spacing: float) -> Samples:
     """Samples `shape` within the box `low`..`high` at about `spacing` [m]."""
     coarse = 4.0 * spacing
@@ -111,9 +120,3 @@ def interior_nodes(
             samples.volume[mine], weights[mine], owner[mine] - len(surface), count, seeds
         )
     return seeds
-
-
-def mean_spacing(x: Points) -> float:
-    """Mean distance [m] of a node to its six nearest neighbours."""
-    distances, _ = cKDTree(x).query(x, k=7)
-    return float(distances[:, 1:].mean())

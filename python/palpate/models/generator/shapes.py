@@ -29,22 +29,25 @@ class Tube:
     """A filled, bent, tapered vessel with blunt, rounded ends.
 
     `path` (n, 3) [m] is interpolated by a cubic spline, `radii` (n,) [m] along with it. An end whose
-    flag in `cut` is set is cut square (rounded by `rim`), the other is buried in a parent vessel.
+    flag in `cut` is set is cut square (rounded by `rim`), the other is a half ball, or buried in a
+    parent vessel. `name` is that of the node set at the cut.
     """
 
     def __init__(
         self,
+        name: str,
         path: Sequence[Sequence[float]],
         radii: Sequence[float],
         cut: tuple[bool, bool],
         rim: float = 0.005,
     ) -> None:
+        self.name = name
         knots = np.asarray(path, dtype=float)
         steps = np.linalg.norm(np.diff(knots, axis=0), axis=1)
         parameter = np.concatenate([[0.0], np.cumsum(steps)])
         fine = np.linspace(0.0, parameter[-1], 400)
         self.centres = CubicSpline(parameter, knots, bc_type="natural")(fine)
-        self.radii = CubicSpline(parameter, np.asarray(radii, dtype=float), bc_type="natural")(fine)
+        self.radii = CubicSpline(parameter, np.asarray(radii, dtype=float), bc_type="clamped")(fine)
         self.tree = cKDTree(self.centres)
         self.cut = cut
         self.rim = rim
@@ -90,14 +93,18 @@ class Vessel:
             value = smooth_union(value, tube(x), self.blend)
         return value
 
-    def ends(self) -> list[tuple[Points, float]]:
-        """Centre and radius of every cut end, tube by tube, first end before last."""
-        return [
-            (tube.centres[end], float(tube.radii[end]))
-            for tube in self.tubes
-            for flag, end in zip(tube.cut, (0, -1), strict=True)
-            if flag
-        ]
+    def ends(self, nodes: Points, depth: float) -> dict[str, np.ndarray]:
+        """Nodes within `depth` [m] of each cut, by the tube's name."""
+        found = {}
+        for tube in self.tubes:
+            for flag, end, inner in ((tube.cut[0], 0, 6), (tube.cut[1], -1, -7)):
+                if flag:
+                    axis = tube.centres[end] - tube.centres[inner]
+                    axis /= np.linalg.norm(axis)
+                    offset = nodes - tube.centres[end]
+                    near = np.linalg.norm(offset, axis=1) < 1.6 * tube.radii[end] + depth
+                    found[tube.name] = np.flatnonzero(near & (offset @ axis > -depth))
+        return found
 
 
 def ellipsoid(x: Points, centre: Sequence[float], half_axes: Sequence[float]) -> np.ndarray:
@@ -112,6 +119,7 @@ def ellipsoid(x: Points, centre: Sequence[float], half_axes: Sequence[float]) ->
 def aorta() -> Vessel:
     """Abdominal aorta with coeliac trunk, superior mesenteric, both renal and both iliac arteries."""
     trunk = Tube(
+        "top",
         [
             (0.004, 0.012, 0.092),
             (0.007, 0.006, 0.062),
@@ -124,21 +132,25 @@ def aorta() -> Vessel:
         (True, False),
     )
     coeliac = Tube(
+        "coeliac",
         [(0.007, 0.005, 0.059), (0.007, -0.010, 0.058), (0.009, -0.022, 0.055)],
         [0.0050, 0.0048, 0.0046],
         (False, True),
     )
     mesenteric = Tube(
+        "mesenteric",
         [
-            (0.009, 0.003, 0.036),
-            (0.009, -0.015, 0.030),
-            (0.007, -0.024, 0.014),
-            (0.005, -0.029, -0.010),
+            (0.009, 0.002, 0.038),
+            (0.009, -0.013, 0.032),
+            (0.007, -0.0200, 0.016),
+            (0.006, -0.0240, -0.004),
+            (0.006, -0.0285, -0.022),
         ],
-        [0.0052, 0.0050, 0.0047, 0.0045],
+        [0.0052, 0.0050, 0.0047, 0.0045, 0.0045],
         (False, True),
     )
     renal_left = Tube(
+        "renal_left",
         [
             (0.010, 0.000, 0.014),
             (0.026, 0.001, 0.012),
@@ -149,6 +161,7 @@ def aorta() -> Vessel:
         (False, True),
     )
     renal_right = Tube(
+        "renal_right",
         [
             (0.010, 0.000, 0.006),
             (-0.006, 0.003, 0.004),
@@ -159,23 +172,25 @@ def aorta() -> Vessel:
         (False, True),
     )
     iliac_left = Tube(
+        "iliac_left",
         [
-            (0.008, -0.002, -0.055),
-            (0.014, -0.002, -0.077),
+            (0.008, -0.002, -0.061),
+            (0.014, -0.002, -0.079),
             (0.027, 0.003, -0.098),
             (0.040, 0.004, -0.124),
         ],
-        [0.0072, 0.0068, 0.0062, 0.0058],
+        [0.0064, 0.0065, 0.0062, 0.0058],
         (False, True),
     )
     iliac_right = Tube(
+        "iliac_right",
         [
-            (0.008, -0.002, -0.055),
-            (0.000, -0.003, -0.077),
+            (0.006, -0.002, -0.061),
+            (0.000, -0.003, -0.079),
             (-0.015, 0.001, -0.098),
             (-0.030, 0.001, -0.124),
         ],
-        [0.0072, 0.0068, 0.0062, 0.0058],
+        [0.0064, 0.0065, 0.0062, 0.0058],
         (False, True),
     )
     return Vessel(
@@ -186,6 +201,7 @@ def aorta() -> Vessel:
 def vena_cava() -> Vessel:
     """Inferior vena cava with three hepatic, both renal and both iliac veins."""
     trunk = Tube(
+        "top",
         [
             (-0.020, -0.022, 0.118),
             (-0.024, -0.016, 0.085),
@@ -198,21 +214,25 @@ def vena_cava() -> Vessel:
         (True, False),
     )
     hepatic_right = Tube(
+        "hepatic_right",
         [(-0.024, -0.017, 0.094), (-0.040, -0.015, 0.100), (-0.060, -0.012, 0.097)],
         [0.0062, 0.0058, 0.0052],
         (False, True),
     )
     hepatic_middle = Tube(
+        "hepatic_middle",
         [(-0.022, -0.019, 0.100), (-0.026, -0.038, 0.105), (-0.036, -0.054, 0.102)],
         [0.0062, 0.0056, 0.0050],
         (False, True),
     )
     hepatic_left = Tube(
+        "hepatic_left",
         [(-0.021, -0.020, 0.101), (-0.006, -0.033, 0.108), (0.012, -0.043, 0.107)],
         [0.0062, 0.0056, 0.0050],
         (False, True),
     )
     renal_left = Tube(
+        "renal_left",
         [
             (-0.020, -0.007, 0.018),
             (-0.005, -0.017, 0.019),
@@ -224,28 +244,31 @@ def vena_cava() -> Vessel:
         (False, True),
     )
     renal_right = Tube(
+        "renal_right",
         [(-0.020, -0.007, 0.014), (-0.036, -0.004, 0.010), (-0.051, 0.002, 0.003)],
         [0.0064, 0.0058, 0.0060],
         (False, True),
     )
     iliac_left = Tube(
+        "iliac_left",
         [
-            (-0.015, 0.006, -0.056),
-            (-0.006, 0.014, -0.078),
+            (-0.014, 0.007, -0.063),
+            (-0.006, 0.014, -0.080),
             (0.012, 0.021, -0.096),
             (0.032, 0.022, -0.118),
         ],
-        [0.0090, 0.0082, 0.0074, 0.0070],
+        [0.0080, 0.0079, 0.0074, 0.0070],
         (False, True),
     )
     iliac_right = Tube(
+        "iliac_right",
         [
-            (-0.015, 0.006, -0.056),
-            (-0.021, 0.014, -0.080),
+            (-0.015, 0.007, -0.063),
+            (-0.021, 0.014, -0.081),
             (-0.032, 0.020, -0.100),
             (-0.046, 0.020, -0.124),
         ],
-        [0.0090, 0.0082, 0.0074, 0.0070],
+        [0.0080, 0.0079, 0.0074, 0.0070],
         (False, True),
     )
     return Vessel(
@@ -263,26 +286,33 @@ def vena_cava() -> Vessel:
     )
 
 
-KIDNEY_CENTRE = (0.082, 0.016, 0.010)
-KIDNEY_HILUM = (0.059, 0.010, 0.008)
+class Kidney:
+    """Left kidney: a thick, flattened arc whose poles bend inward, with the hilum on its inner side."""
 
+    CENTRE = (0.084, 0.016, 0.010)
+    FLATTENING = 1.28
+    # The upper pole leans to the spine; the hilum looks a little forward.
+    LEAN, TURN = np.radians(13.0), np.radians(-24.0)
 
-def kidney(x: Points) -> np.ndarray:
-    """Left kidney: a bent ellipsoid, upper pole leaning to the spine, with the hilum on its inner side."""
-    p = x - np.asarray(KIDNEY_CENTRE)
-    tilt_z, tilt_y = np.radians(14.0), np.radians(-25.0)
-    # The long axis leans inward above, and the inner side looks a little forward.
-    u = np.cos(tilt_z) * p[:, 0] + np.sin(tilt_z) * p[:, 2]
-    w = -np.sin(tilt_z) * p[:, 0] + np.cos(tilt_z) * p[:, 2]
-    v = -np.sin(tilt_y) * u + np.cos(tilt_y) * p[:, 1]
-    u = np.cos(tilt_y) * u + np.sin(tilt_y) * p[:, 1]
-    bent = np.stack([u + 5.2 * w * w - 0.003, v, w], axis=1)
-    # The upper pole is broader than the lower one.
-    widen = 1.0 + 1.3 * w
-    bent[:, :2] /= widen[:, None]
-    body = ellipsoid(bent, (0.0, 0.0, 0.0), (0.0275, 0.0205, 0.0555))
-    sinus = ellipsoid(np.stack([u, v, w], axis=1), (-0.029, 0.0, 0.0), (0.0155, 0.0075, 0.0165))
-    return smooth_intersection(body, -sinus, 0.009)
+    def __init__(self) -> None:
+        w = np.linspace(-0.031, 0.030, 7)
+        path = np.stack([-9.0 * w**2 + 0.004, np.zeros(7), w], axis=1)
+        radii = [0.0215, 0.0238, 0.0252, 0.0258, 0.0260, 0.0252, 0.0236]
+        self.body = Tube("", path.tolist(), radii, (False, False))
+
+    def __call__(self, x: Points) -> np.ndarray:
+        p = self.local(x)
+        body = self.body(p * (1.0, self.FLATTENING, 1.0))
+        sinus = ellipsoid(p, (-0.0225, 0.0, 0.0), (0.0125, 0.0075, 0.0135))
+        return smooth_intersection(body, -sinus, 0.007)
+
+    def local(self, x: Points) -> np.ndarray:
+        """Axes of the kidney: outward, across its thickness, to the upper pole."""
+        p = x - np.asarray(self.CENTRE)
+        cos, sin = np.cos(self.LEAN), np.sin(self.LEAN)
+        u, w = cos * p[:, 0] + sin * p[:, 2], -sin * p[:, 0] + cos * p[:, 2]
+        cos, sin = np.cos(self.TURN), np.sin(self.TURN)
+        return np.stack([cos * u + sin * p[:, 1], cos * p[:, 1] - sin * u, w], axis=1)
 
 
 def small(x: Points) -> np.ndarray:
