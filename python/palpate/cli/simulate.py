@@ -54,7 +54,7 @@ def simulate(
     leaf_size: LeafSizeOption = None,
     method: Annotated[
         Method | None,
-        typer.Option(help="How touching triangles are found; paper unless given."),
+        typer.Option(help="How touching triangles are found; wide unless given."),
     ] = None,
     checkpoint: Annotated[
         bool, typer.Option("--checkpoint", help="Save OUTPUT/checkpoint.palpate at the end.")
