@@ -6,4 +6,5 @@ mod elasticity;
 mod errors;
 mod free_motion;
 mod friction;
+mod impact;
 mod world;

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use palpate_contact::{IntersectionOptions, Scene, SceneOptions};
+use palpate_contact::{IntersectionOptions, PenetratingNode, ProximityPair, Scene, SceneOptions};
 use palpate_geometry::Point;
 use palpate_mechanics::{Dynamics, DynamicsOptions, StepStats};
 use palpate_model::{Body, Material, Mesh, MeshData, Model, RigidMotion};
@@ -76,15 +76,21 @@ impl World {
         Self { dynamics, scene }
     }
 
-    pub(crate) fn step(&mut self) -> StepStats {
+    /// Detects the contacts of the step that has begun.
+    pub(crate) fn detect(&mut self) -> (Vec<ProximityPair>, Vec<PenetratingNode>) {
         let positions: Vec<&[Point]> =
             (0..self.dynamics.body_count()).map(|body| self.dynamics.positions(body)).collect();
         self.scene.update(&positions).unwrap();
-        self.dynamics.begin_step();
         let dynamics = &self.dynamics;
         let include = |a: usize, b: usize| dynamics.search_distance(a, b).is_some();
         let penetration = self.scene.penetration(&include).nodes.clone();
         let pairs = self.scene.proximity(&|a, b| dynamics.search_distance(a, b)).pairs.clone();
+        (pairs, penetration)
+    }
+
+    pub(crate) fn step(&mut self) -> StepStats {
+        self.dynamics.begin_step();
+        let (pairs, penetration) = self.detect();
         self.dynamics.finish_step(&pairs, &penetration).unwrap()
     }
 
