@@ -7,6 +7,8 @@ pub(crate) mod last_forces;
 pub(crate) mod problem;
 pub(crate) mod response;
 mod surface;
+#[cfg(test)]
+mod twin;
 
 use glam::DVec3;
 use palpate_contact::PairKind;

@@ -21,12 +21,12 @@ const GRADIENT_REDUCTION: f64 = 1e-2;
 /// Part of the contact distance in which the penalty is soft. Below it, and where the recovery is
 /// limited, a contact is [`HARDENING`] times stiffer: surfaces must not pass through each other even
 /// where all the load is on a few nodes, since an open surface would then push the wrong way.
-const SOFT_PART: f64 = 0.5;
-const HARDENING: f64 = 100.0;
+pub(super) const SOFT_PART: f64 = 0.5;
+pub(super) const HARDENING: f64 = 100.0;
 /// Smallest softness of an equation relative to its own compliance: keeps the matrix regular.
-const SOFTNESS_FLOOR: f64 = 1e-6;
+pub(super) const SOFTNESS_FLOOR: f64 = 1e-6;
 /// Sweeps end when no force changes by more than this part of the largest one.
-const SWEEP_TOLERANCE: f64 = 1e-4;
+pub(super) const SWEEP_TOLERANCE: f64 = 1e-4;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Mode {

@@ -222,6 +222,20 @@ impl Problem {
         &self.compliance[..self.row_count * self.row_count]
     }
 
+    /// A problem of given W and free displacements along the axes; every block has one row or three.
+    #[cfg(test)]
+    pub(super) fn with_compliance(compliance: Vec<f64>, free: &[DVec3], rows: u32) -> Self {
+        let block = |(index, &free): (usize, &DVec3)| Block {
+            first: index as u32 * rows,
+            rows,
+            axes: DMat3::IDENTITY,
+            free,
+            places: [0; 4],
+        };
+        let blocks = free.iter().enumerate().map(block).collect();
+        Self { blocks, row_count: free.len() * rows as usize, compliance, ..Self::default() }
+    }
+
     /// Row `row` of W.
     pub(crate) fn compliance_row(&self, row: usize) -> &[f64] {
         &self.compliance[row * self.row_count..][..self.row_count]
