@@ -17,6 +17,20 @@ _Contact = tuple[float, float | None, float | None, bool]
 _Key = tuple[float, _Vec3, _Quaternion]
 _Stats = tuple[float, float, float, int, int, int, int, int, int]
 
+__all__ = [
+    "Mesh",
+    "read_mesh_file",
+    "write_mesh_file",
+    "Body",
+    "Model",
+    "format_model",
+    "load_model",
+    "Scene",
+    "Simulation",
+    "Snapshot",
+    "__version__",
+]
+
 __version__: str
 
 @final
