@@ -18,17 +18,17 @@ _Key = tuple[float, _Vec3, _Quaternion]
 _Stats = tuple[float, float, float, int, int, int, int, int, int]
 
 __all__ = [
-    "Mesh",
-    "read_mesh_file",
-    "write_mesh_file",
     "Body",
+    "Mesh",
     "Model",
-    "format_model",
-    "load_model",
     "Scene",
     "Simulation",
     "Snapshot",
     "__version__",
+    "format_model",
+    "load_model",
+    "read_mesh_file",
+    "write_mesh_file",
 ]
 
 __version__: str
