@@ -207,6 +207,22 @@ fn write_atomically(
     path: &Path,
     write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
 ) -> Result<(), FileError> {
+    write_whole(path, write).map_err(|error| FileError {
+        path: path.to_owned(),
+        line: None,
+        cause: error.into(),
+    })
+}
+
+/// Writes a file of any kind under a temporary name beside `path` and renames it: under its own name
+/// it is complete or absent.
+///
+/// # Errors
+/// If the file cannot be written or renamed; nothing is left behind then.
+pub fn write_whole(
+    path: &Path,
+    write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+) -> io::Result<()> {
     let mut name = path.file_name().unwrap_or_default().to_owned();
     name.push(format!(".{}.part", std::process::id()));
     let part = path.with_file_name(name);
@@ -216,11 +232,8 @@ fn write_atomically(
         out.into_inner().map_err(io::IntoInnerError::into_error)?.sync_all()?;
         fs::rename(&part, path)
     })();
-    result.map_err(|error| {
-        // The first error is the one to tell; a leftover that cannot be removed changes nothing.
-        let _ = fs::remove_file(&part);
-        FileError { path: path.to_owned(), line: None, cause: error.into() }
-    })
+    // The first error is the one to tell; a leftover that cannot be removed changes nothing.
+    result.inspect_err(|_| drop(fs::remove_file(&part)))
 }
 
 #[cfg(test)]

@@ -3,15 +3,14 @@
 //! Layout: magic, format version (u32), payload length (u64), CRC-32 of the payload (u32), all
 //! little-endian, then the payload (postcard).
 
-use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use palpate_contact::SceneOptions;
 use palpate_mechanics::State;
+use palpate_model::files::write_whole;
 use palpate_model::{Document, Model};
 use serde::{Deserialize, Serialize};
-use tempfile::NamedTempFile;
 
 use crate::simulation::{Simulation, SimulationError, SimulationOptions};
 
@@ -77,7 +76,7 @@ impl Simulation {
         let io = |source| CheckpointError::Io { path: path.to_path_buf(), source };
         let bytes = postcard::to_stdvec(&payload)
             .map_err(|error| io(std::io::Error::other(error.to_string())))?;
-        write_whole(path, &bytes).map_err(io)
+        write_checkpoint(path, &bytes).map_err(io)
     }
 
     /// Continues from a checkpoint, bit for bit, with any number of threads.
@@ -110,21 +109,15 @@ impl Simulation {
     }
 }
 
-/// Header and payload into a temporary file beside `path`, then renamed.
-fn write_whole(path: &Path, payload: &[u8]) -> std::io::Result<()> {
-    let folder = match path.parent() {
-        Some(parent) if !parent.as_os_str().is_empty() => parent,
-        _ => Path::new("."),
-    };
-    let mut file = NamedTempFile::new_in(folder)?;
-    file.write_all(&MAGIC)?;
-    file.write_all(&VERSION.to_le_bytes())?;
-    file.write_all(&(payload.len() as u64).to_le_bytes())?;
-    file.write_all(&crc32fast::hash(payload).to_le_bytes())?;
-    file.write_all(payload)?;
-    file.as_file().sync_all()?;
-    file.persist(path)?;
-    Ok(())
+/// Header and payload, complete or absent.
+fn write_checkpoint(path: &Path, payload: &[u8]) -> std::io::Result<()> {
+    write_whole(path, |file| {
+        file.write_all(&MAGIC)?;
+        file.write_all(&VERSION.to_le_bytes())?;
+        file.write_all(&(payload.len() as u64).to_le_bytes())?;
+        file.write_all(&crc32fast::hash(payload).to_le_bytes())?;
+        file.write_all(payload)
+    })
 }
 
 /// The payload of a whole checkpoint, or what is wrong with it.
