@@ -10,7 +10,6 @@ mod surface;
 #[cfg(test)]
 mod twin;
 
-use glam::DVec3;
 use palpate_contact::PairKind;
 use palpate_geometry::Point;
 use palpate_model::Body;
@@ -116,12 +115,7 @@ impl ContactParameters {
                 });
             }
         }
-        let mesh = &body.mesh;
-        let lengths = mesh.surface_edges().iter().map(|&[a, b]| {
-            let [a, b] = [a, b].map(|node| DVec3::from_array(mesh.nodes()[node as usize]));
-            a.distance(b)
-        });
-        let mean_edge = lengths.sum::<f64>() / mesh.surface_edges().len().max(1) as f64;
+        let mean_edge = body.mesh.mean_surface_edge();
         let rigid = body.rigid.is_some();
         let own_distance = settings.distance.unwrap_or(DISTANCE_FACTOR * mean_edge);
         let stiffness = STIFFNESS_FACTOR * body.material.young / mean_edge;

@@ -4,7 +4,9 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use numpy::{PyArray2, PyReadonlyArray2};
-use palpate::contact::{DetectionStats, IntersectionOptions, Method, Split};
+use palpate::contact::{
+    DetectionStats, IntersectionOptions, Intersections, Method, Split, TrianglePair,
+};
 use palpate::geometry::Point;
 use palpate::{Scene, SceneOptions};
 use pyo3::exceptions::PyValueError;
@@ -95,11 +97,7 @@ impl PyScene {
         let options = IntersectionOptions { self_contact, same_leaf };
         let (rows, stats) = py.detach(|| {
             let mut guard = self.lock();
-            let found = guard.0.intersections(&options);
-            let row = |pair: &palpate::contact::TrianglePair| {
-                [pair.body_a, pair.triangle_a, pair.body_b, pair.triangle_b]
-            };
-            (found.pairs.iter().map(row).collect::<Vec<_>>(), stats_row(&found.stats))
+            intersection_rows(guard.0.intersections(&options))
         });
         Ok((index_matrix(py, &rows)?, stats))
     }
@@ -122,8 +120,14 @@ impl PyScene {
     }
 }
 
+/// The pairs as rows for Python, and what they cost.
+pub(crate) fn intersection_rows(found: &Intersections) -> (Vec<[u32; 4]>, StatsRow) {
+    let row = |pair: &TrianglePair| [pair.body_a, pair.triangle_a, pair.body_b, pair.triangle_b];
+    (found.pairs.iter().map(row).collect(), stats_row(&found.stats))
+}
+
 /// The statistics as a row for Python.
-pub(crate) fn stats_row(stats: &DetectionStats) -> StatsRow {
+fn stats_row(stats: &DetectionStats) -> StatsRow {
     (
         stats.object_time.as_secs_f64(),
         stats.traversal_time.as_secs_f64(),

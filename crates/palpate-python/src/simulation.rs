@@ -14,7 +14,7 @@ use pyo3::types::{PyDict, PyTuple};
 use crate::arrays::{index_matrix, matrix, points, vector};
 use crate::errors::raise;
 use crate::model::PyModel;
-use crate::scene::{StatsRow, scene_options, stats_row};
+use crate::scene::{StatsRow, intersection_rows, scene_options};
 
 /// A state to come back to.
 #[pyclass(frozen, name = "Snapshot", module = "palpate._core")]
@@ -206,12 +206,7 @@ impl PySimulation {
         let found = py.detach(|| {
             let mut guard = self.lock();
             let scene = guard.scene()?;
-            let found = scene.intersections(&options);
-            let row = |pair: &palpate::contact::TrianglePair| {
-                [pair.body_a, pair.triangle_a, pair.body_b, pair.triangle_b]
-            };
-            let rows: Vec<_> = found.pairs.iter().map(row).collect();
-            Ok::<_, palpate::SimulationError>((rows, stats_row(&found.stats)))
+            Ok::<_, palpate::SimulationError>(intersection_rows(scene.intersections(&options)))
         });
         let (rows, stats) = raise(py, found)?;
         Ok((index_matrix(py, &rows)?, stats))
