@@ -1,6 +1,7 @@
 """Real-time contact detection and deformation for soft bodies made of tetrahedra."""
 
 from palpate._core import __version__
+from palpate.contacts import DetectionStats, Intersections
 from palpate.errors import (
     CheckpointError,
     Diagnostic,
@@ -12,7 +13,7 @@ from palpate.errors import (
 from palpate.files import read_mesh, write_mesh
 from palpate.mesh import Defect, Mesh
 from palpate.model import Body, Contact, Material, Model, RigidKey, TreeElement, read_model
-from palpate.scene import DetectionStats, Intersections, Scene
+from palpate.scene import Scene
 from palpate.simulation import Contacts, Simulation, Snapshot, StepReport
 
 __all__ = [

@@ -11,9 +11,10 @@ import numpy.typing as npt
 
 from palpate import _arrays, _core
 from palpate._arrays import Float64Array, IndexArray
+from palpate.contacts import DetectionStats, Intersections
 from palpate.mesh import Mesh
 from palpate.model import Body, Model, body_index, read_model
-from palpate.scene import METHODS, SPLITS, DetectionStats, Intersections, _choice
+from palpate.scene import METHODS, SPLITS, _choice
 
 
 @dataclass(frozen=True)

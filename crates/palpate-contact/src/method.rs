@@ -22,13 +22,13 @@ pub(crate) use paper::meeting_triangles;
 #[non_exhaustive]
 pub enum Method {
     /// The paper's bounding trees: bodies, then leaves against subtrees, then polygons.
-    #[default]
     Paper,
     /// Every pair of surface elements: slow and obvious.
     AllPairs,
     /// Spatial hashing after Teschner et al. 2003; proximity goes through the bounding trees.
     Hash,
     /// The wide layout: triangles in blocks of eight, level by level.
+    #[default]
     Wide,
 }
 

@@ -41,7 +41,7 @@ pub struct SceneOptions {
 
 impl Default for SceneOptions {
     fn default() -> Self {
-        Self { leaf_size: 10, split: Split::Middle, method: Method::Paper, threads: 1 }
+        Self { leaf_size: 10, split: Split::Middle, method: Method::Wide, threads: 1 }
     }
 }
 

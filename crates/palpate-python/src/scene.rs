@@ -1,25 +1,25 @@
 //! `palpate._core.Scene`: contact detection on the caller's positions.
 
+mod queries;
+
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use numpy::{PyArray2, PyReadonlyArray2};
-use palpate::contact::{
-    DetectionStats, IntersectionOptions, Intersections, Method, Split, TrianglePair,
-};
+use palpate::contact::{IntersectionOptions, Method, Split};
 use palpate::geometry::Point;
 use palpate::{Scene, SceneOptions};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::arrays::{index_matrix, matrix, points};
+use crate::arrays::{matrix, points};
 use crate::errors::raise;
 use crate::mesh::PyMesh;
 use crate::model::structure_from_python;
 
-/// Times [s] and counts of a query, in the order of `palpate.DetectionStats`.
-pub(crate) type StatsRow = (f64, f64, f64, u64, u64, u64, u64, u64, u64);
+use queries::IntersectionColumns;
+pub(crate) use queries::{StatsRow, intersection_rows};
 
 /// Bodies and their bounding trees. The lock lets two Python threads use one scene in turn.
 #[pyclass(frozen, name = "Scene", module = "palpate._core")]
@@ -93,13 +93,8 @@ impl PyScene {
         py: Python<'py>,
         self_contact: bool,
         same_leaf: bool,
-    ) -> PyResult<(Bound<'py, PyArray2<i32>>, StatsRow)> {
-        let options = IntersectionOptions { self_contact, same_leaf };
-        let (rows, stats) = py.detach(|| {
-            let mut guard = self.lock();
-            intersection_rows(guard.0.intersections(&options))
-        });
-        Ok((index_matrix(py, &rows)?, stats))
+    ) -> PyResult<IntersectionColumns<'py>> {
+        self.find_intersections(py, IntersectionOptions { self_contact, same_leaf })
     }
 
     fn tree_stats<'py>(&self, py: Python<'py>, body: usize) -> PyResult<Bound<'py, PyDict>> {
@@ -118,27 +113,6 @@ impl PyScene {
         row.set_item("leaf_fill", stats.leaf_fill.clone())?;
         Ok(row)
     }
-}
-
-/// The pairs as rows for Python, and what they cost.
-pub(crate) fn intersection_rows(found: &Intersections) -> (Vec<[u32; 4]>, StatsRow) {
-    let row = |pair: &TrianglePair| [pair.body_a, pair.triangle_a, pair.body_b, pair.triangle_b];
-    (found.pairs.iter().map(row).collect(), stats_row(&found.stats))
-}
-
-/// The statistics as a row for Python.
-fn stats_row(stats: &DetectionStats) -> StatsRow {
-    (
-        stats.object_time.as_secs_f64(),
-        stats.traversal_time.as_secs_f64(),
-        stats.polygon_time.as_secs_f64(),
-        stats.object_pairs,
-        stats.nodes_visited,
-        stats.leaf_pairs,
-        stats.box_tests,
-        stats.polygon_tests,
-        stats.all_pairs,
-    )
 }
 
 /// Options from the words that Python uses; the words were checked there already.

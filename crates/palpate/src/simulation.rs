@@ -4,7 +4,7 @@ use std::ops::AddAssign;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use palpate_contact::{Method, PenetratingNode, Scene, SceneError, SceneOptions};
+use palpate_contact::{PenetratingNode, Scene, SceneError, SceneOptions};
 use palpate_geometry::Point;
 use palpate_mechanics::{Contact, Dynamics, DynamicsOptions, MechanicsError, State, StepStats};
 use palpate_model::Model;
@@ -22,8 +22,7 @@ pub struct SimulationOptions {
 
 impl Default for SimulationOptions {
     fn default() -> Self {
-        let scene = SceneOptions { method: Method::Wide, ..SceneOptions::default() };
-        Self { time_step: 1.0 / 60.0, scene, threads: 1 }
+        Self { time_step: 1.0 / 60.0, scene: SceneOptions::default(), threads: 1 }
     }
 }
 

@@ -23,8 +23,9 @@ from palpate.cli.output import (
     table,
     whole,
 )
+from palpate.contacts import Intersections
 from palpate.results.atomic import replacing
-from palpate.scene import Intersections, Scene
+from palpate.scene import Scene
 
 
 class Method(Enum):

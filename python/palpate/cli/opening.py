@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from palpate.contacts import Intersections
 from palpate.files import read_mesh
 from palpate.model import Body, Model, find_model, read_model
-from palpate.scene import Intersections
 
 #: Extensions that name a mesh; everything else is a model.
 MESH_SUFFIXES = frozenset(

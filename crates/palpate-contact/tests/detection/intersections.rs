@@ -62,7 +62,7 @@ fn all_options() -> Vec<SceneOptions> {
     let mut all = Vec::new();
     for leaf_size in [1, 2, 5, 50] {
         for split in [Split::Middle, Split::Count] {
-            all.push(SceneOptions { leaf_size, split, ..SceneOptions::default() });
+            all.push(SceneOptions { leaf_size, split, method: Method::Paper, threads: 1 });
         }
     }
     all.push(SceneOptions { method: Method::Hash, ..SceneOptions::default() });
@@ -136,7 +136,8 @@ fn results_are_the_same_at_any_number_of_threads() {
     for frame in &case.frames {
         let mut previous: Option<Vec<TrianglePair>> = None;
         for threads in [1, 2, 3, 8] {
-            let options = SceneOptions { threads, leaf_size: 1, ..SceneOptions::default() };
+            let options =
+                SceneOptions { threads, leaf_size: 1, method: Method::Paper, ..Default::default() };
             let mut scene = scene(&case.meshes, options);
             scene.update(&as_slices(frame)).expect("finite positions");
             validate(&scene);

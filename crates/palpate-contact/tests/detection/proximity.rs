@@ -157,7 +157,8 @@ fn results_are_the_same_at_any_number_of_threads() {
         soup(200, 8.0, &mut random),
     ];
     let of = |threads| {
-        let mut scene = scene(&meshes, SceneOptions { threads, ..SceneOptions::default() });
+        let mut scene =
+            scene(&meshes, SceneOptions { threads, method: Method::Paper, ..Default::default() });
         let pairs = scene.proximity(&|_, _| Some(0.3)).pairs.clone();
         let nodes = scene.penetration(&|_, _| true).nodes.clone();
         assert!(!pairs.is_empty() && !nodes.is_empty());
