@@ -1,6 +1,7 @@
 //! The factor of a body's matrix: made once, solved every step.
 
 mod packed;
+mod real;
 mod scalar_matrix;
 
 use faer::Par;
@@ -16,8 +17,7 @@ use faer::sparse::linalg::{SupernodalThreshold, SymbolicSupernodalParams};
 
 use crate::ordering::{NodeOrder, OrderingMethod};
 use crate::{BlockMatrix, BlockPattern};
-use packed::PackedFactor;
-pub use packed::SolveWorkspace;
+use packed::{PackedFactor, PackedWorkspace};
 use scalar_matrix::ScalarMatrix;
 
 /// Merge supernodes of up to so many columns while so small a part of the merged one is zero.
@@ -25,6 +25,18 @@ const RELAXATION: [(usize, f64); 4] = [(12, 1.0), (32, 0.5), (64, 0.2), (usize::
 
 /// Largest residual of the probe solve, relative to the right-hand side.
 const PROBE_TOLERANCE: f64 = 1e-6;
+/// The same for a factor kept in single precision; beyond it, it is kept in double precision.
+const SINGLE_PROBE_TOLERANCE: f64 = 1e-4;
+
+/// The precision that a factor is kept and solved in. It is always computed in double precision.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Precision {
+    /// Solutions to about 14 digits less those of the condition number.
+    Double,
+    /// Half the bytes, and half the time of a solve, where the matrix is well enough conditioned
+    /// for a relative residual of 1e-4; double precision where not.
+    Single,
+}
 
 /// Why a matrix has no usable factor.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
@@ -83,16 +95,52 @@ pub struct Cholesky {
     scalar: ScalarMatrix,
     symbolic: SymbolicCholesky<u32>,
     values: Vec<f64>,
-    packed: PackedFactor,
+    precision: Precision,
+    packed: Packed,
     scratch: MemBuffer,
 }
 
+/// The factor in the precision that it is solved in.
+enum Packed {
+    Single(PackedFactor<f32>),
+    Double(PackedFactor<f64>),
+}
+
+/// Memory for solves with one factor, for one thread.
+#[derive(Debug, Default)]
+pub struct SolveWorkspace {
+    single: PackedWorkspace<f32>,
+    double: PackedWorkspace<f64>,
+}
+
+/// Calls a method of the packed factor with the workspace of its precision.
+macro_rules! solve {
+    ($self:ident, $work:ident, $method:ident, $($argument:expr),*) => {
+        match &$self.packed {
+            Packed::Single(packed) => {
+                packed.$method(&$self.order.nodes, $($argument,)* &mut $work.single);
+            }
+            Packed::Double(packed) => {
+                packed.$method(&$self.order.nodes, $($argument,)* &mut $work.double);
+            }
+        }
+    };
+}
+
 impl Cholesky {
-    /// Orders, analyses and factors `matrix`, on the calling thread.
+    /// Orders, analyses and factors `matrix`, on the calling thread, and keeps it in double precision.
     ///
     /// # Errors
     /// If the matrix is not positive definite or too ill-conditioned for a direct solve.
     pub fn new(matrix: &BlockMatrix) -> Result<Self, FactorError> {
+        Self::with_precision(matrix, Precision::Double)
+    }
+
+    /// [`Cholesky::new`], kept in the given precision.
+    ///
+    /// # Errors
+    /// As [`Cholesky::new`].
+    pub fn with_precision(matrix: &BlockMatrix, precision: Precision) -> Result<Self, FactorError> {
         let pattern = std::sync::Arc::clone(matrix.pattern());
         let order = NodeOrder::new(&pattern);
         let scalar = ScalarMatrix::new(&pattern, &order.nodes);
@@ -115,8 +163,9 @@ impl Cholesky {
             symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, faer::Spec::default()),
         );
         let values = vec![0.0; symbolic.len_val()];
-        let packed = PackedFactor::default();
-        let mut result = Self { pattern, order, scalar, symbolic, values, packed, scratch };
+        let packed = Packed::Double(PackedFactor::default());
+        let mut result =
+            Self { pattern, order, scalar, symbolic, values, precision, packed, scratch };
         result.refactor(matrix)?;
         Ok(result)
     }
@@ -149,8 +198,16 @@ impl Cholesky {
         let SymbolicCholeskyRaw::Supernodal(symbolic) = self.symbolic.raw() else {
             unreachable!("the supernodal form was forced")
         };
-        self.packed = PackedFactor::new(SupernodalLltRef::new(symbolic, &self.values));
-        self.probe(matrix)
+        let factor = SupernodalLltRef::new(symbolic, &self.values);
+        if self.precision == Precision::Single {
+            self.packed = Packed::Single(PackedFactor::new(factor));
+            if self.probe(matrix) < SINGLE_PROBE_TOLERANCE {
+                return Ok(());
+            }
+        }
+        self.packed = Packed::Double(PackedFactor::new(factor));
+        let residual = self.probe(matrix);
+        if residual < PROBE_TOLERANCE { Ok(()) } else { Err(FactorError::Inaccurate { residual }) }
     }
 
     fn not_positive(&self, place: usize) -> FactorError {
@@ -159,8 +216,9 @@ impl Cholesky {
         FactorError::NotPositiveDefinite { node, column: 3 * node + place % 3 }
     }
 
-    /// Solves with a known right-hand side: faer has been seen to return factors of broken input.
-    fn probe(&self, matrix: &BlockMatrix) -> Result<(), FactorError> {
+    /// Residual of a solve relative to its known right-hand side: faer has been seen to return
+    /// factors of broken input.
+    fn probe(&self, matrix: &BlockMatrix) -> f64 {
         let count = self.pattern.node_count();
         let mut state = 1_u32;
         let mut draw = || {
@@ -176,8 +234,7 @@ impl Cholesky {
         for (p, r) in product.as_flattened_mut().iter_mut().zip(rhs.as_flattened()) {
             *p -= r;
         }
-        let residual = norm(&product) / norm(&rhs);
-        if residual < PROBE_TOLERANCE { Ok(()) } else { Err(FactorError::Inaccurate { residual }) }
+        norm(&product) / norm(&rhs)
     }
 
     /// Number of nodes.
@@ -187,15 +244,20 @@ impl Cholesky {
 
     /// Memory for solves with this factor, for one thread.
     pub fn workspace(&self) -> SolveWorkspace {
-        self.packed.workspace()
+        let mut workspace = SolveWorkspace::default();
+        match &self.packed {
+            Packed::Single(packed) => packed.fit(&mut workspace.single),
+            Packed::Double(packed) => packed.fit(&mut workspace.double),
+        }
+        workspace
     }
 
     /// Solves `A x = rhs` in place. No allocation.
     ///
     /// # Panics
-    /// If `rhs` has not one entry per node, or `workspace` belongs to a factor of another shape.
+    /// If `rhs` has not one entry per node.
     pub fn solve_in_place(&self, rhs: &mut [[f64; 3]], workspace: &mut SolveWorkspace) {
-        self.packed.solve_in_place(&self.order.nodes, rhs, workspace);
+        solve!(self, workspace, solve_in_place, rhs);
     }
 
     /// Solves for three right-hand sides in place, entry `3 * side + k` of each node being
@@ -204,7 +266,7 @@ impl Cholesky {
     /// # Panics
     /// As [`Cholesky::solve_in_place`].
     pub fn solve_three_in_place(&self, sides: &mut [[f64; 9]], workspace: &mut SolveWorkspace) {
-        self.packed.solve_three_in_place(&self.order.nodes, sides, workspace);
+        solve!(self, workspace, solve_three_in_place, sides);
     }
 
     /// Solves for the three unit forces on `node`: `columns[i][3 * axis + k]` is the displacement
@@ -218,7 +280,7 @@ impl Cholesky {
         columns: &mut [[f64; 9]],
         workspace: &mut SolveWorkspace,
     ) {
-        self.packed.solve_node(&self.order.nodes, node, columns, workspace);
+        solve!(self, workspace, solve_node, node, columns);
     }
 
     /// Size and cost.
@@ -227,8 +289,14 @@ impl Cholesky {
             ordering: self.order.method,
             entries: self.order.factor_entries,
             flops: self.order.flops,
-            bytes: self.packed.bytes(),
-            supernodes: self.packed.supernode_count(),
+            bytes: match &self.packed {
+                Packed::Single(packed) => packed.bytes(),
+                Packed::Double(packed) => packed.bytes(),
+            },
+            supernodes: match &self.packed {
+                Packed::Single(packed) => packed.supernode_count(),
+                Packed::Double(packed) => packed.supernode_count(),
+            },
         }
     }
 }

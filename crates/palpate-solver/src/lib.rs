@@ -11,7 +11,7 @@ pub mod ordering;
 pub mod rows;
 
 pub use block_matrix::{BlockMatrix, BlockPattern};
-pub use cholesky::{Cholesky, FactorError, FactorStats, SolveWorkspace};
+pub use cholesky::{Cholesky, FactorError, FactorStats, Precision, SolveWorkspace};
 pub use dense::DenseCholesky;
 pub use ordering::{NodeOrder, OrderingMethod};
 pub use rows::add_rows;

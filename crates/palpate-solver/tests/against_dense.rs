@@ -3,7 +3,7 @@
 #![allow(clippy::needless_range_loop)] // matrices read best by row and column
 use std::sync::Arc;
 
-use palpate_solver::{BlockMatrix, BlockPattern, Cholesky, DenseCholesky, FactorError};
+use palpate_solver::{BlockMatrix, BlockPattern, Cholesky, DenseCholesky, FactorError, Precision};
 use proptest::prelude::*;
 
 /// A random symmetric matrix on `cliques`, made positive definite by diagonal dominance.
@@ -203,4 +203,46 @@ fn an_empty_matrix_is_fine() {
     let matrix = BlockMatrix::zeros(Arc::new(BlockPattern::from_cliques::<4>(0, &[])));
     let factor = Cholesky::new(&matrix).unwrap();
     factor.solve_in_place(&mut [], &mut factor.workspace());
+}
+
+#[test]
+fn single_precision_is_close_and_gives_way_to_double_where_it_is_not() {
+    let (node_count, cliques) = grid(6);
+    let mut values = draws(5);
+    let mut matrix = dominant(node_count, &cliques, &mut values);
+    let rhs: Vec<[f64; 3]> = (0..node_count).map(|_| std::array::from_fn(|_| values())).collect();
+    let solved = |factor: &Cholesky| {
+        let mut x = rhs.clone();
+        factor.solve_in_place(&mut x, &mut factor.workspace());
+        x
+    };
+    let double = Cholesky::new(&matrix).unwrap();
+    let single = Cholesky::with_precision(&matrix, Precision::Single).unwrap();
+    assert!(2 * single.stats().bytes < double.stats().bytes + 100_000);
+    let (x, expected) = (solved(&single), solved(&double));
+    let size = largest_difference(expected.as_flattened(), &vec![0.0; 3 * node_count]);
+    let difference = largest_difference(x.as_flattened(), expected.as_flattened());
+    assert!(difference > 0.0 && difference < 1e-5 * size, "{difference} of {size}");
+
+    // Springs between neighbours, held by almost nothing: single precision cannot solve it.
+    for block in matrix.blocks_mut() {
+        *block = [[0.0; 3]; 3];
+    }
+    for &[a, b, ..] in &cliques {
+        for k in 0..3 {
+            let mut unit = [[0.0; 3]; 3];
+            unit[k][k] = 1.0;
+            matrix.add(a, a, &unit);
+            matrix.add(b, b, &unit);
+            unit[k][k] = -1.0;
+            matrix.add(a.max(b), a.min(b), &unit);
+        }
+    }
+    for node in 0..node_count as u32 {
+        matrix.add(node, node, &[[1e-6, 0.0, 0.0], [0.0, 1e-6, 0.0], [0.0, 0.0, 1e-6]]);
+    }
+    let single = Cholesky::with_precision(&matrix, Precision::Single).unwrap();
+    let double = Cholesky::new(&matrix).unwrap();
+    assert_eq!(single.stats().bytes, double.stats().bytes);
+    assert_eq!(solved(&single), solved(&double));
 }

@@ -7,19 +7,21 @@
 //! backward, descending: `x_top = P^T [x_top; -x[pattern]]`.
 //!
 //! P lies in panels of [`ROWS`] rows, column after column, without the columns that are zero in the
-//! whole panel. A solve is bound by reading it once per pass.
+//! whole panel. A solve is bound by reading it once per pass, so that single precision halves its time.
 
 use faer::linalg::triangular_solve;
 use faer::sparse::linalg::cholesky::supernodal::SupernodalLltRef;
 use faer::{Mat, Par};
 use pulp::Simd;
 
-/// Rows of a panel: what fits in the vector registers together with three right-hand sides.
-const ROWS: usize = 16;
-/// Running sums per column in the backward pass.
-const LANES: usize = 8;
+use super::real::Real;
 
-type Panel = [f64; ROWS];
+/// Rows of a panel: one to eight vectors of any machine and precision.
+const ROWS: usize = 32;
+/// Running sums per column in the backward pass: the longest vector.
+const LANES: usize = 16;
+
+type Panel<T> = [T; ROWS];
 
 #[derive(Clone, Copy, Debug)]
 struct Supernode {
@@ -46,25 +48,25 @@ impl Supernode {
 
 /// The packed factor of one matrix.
 #[derive(Debug, Default)]
-pub(super) struct PackedFactor {
+pub(super) struct PackedFactor<T> {
     supernodes: Vec<Supernode>,
     pattern: Vec<u32>,
-    panels: Vec<Panel>,
+    panels: Vec<Panel<T>>,
     size: usize,
     widest: usize,
     longest: usize,
 }
 
-/// Memory for solves with one factor, for one thread.
+/// Memory for solves with one packed factor, for one thread.
 #[derive(Debug, Default)]
-pub struct SolveWorkspace {
-    x: Vec<f64>,
-    top: Vec<f64>,
-    rows: Vec<f64>,
-    sums: Vec<[f64; LANES]>,
+pub(super) struct PackedWorkspace<T> {
+    x: Vec<T>,
+    top: Vec<T>,
+    rows: Vec<T>,
+    sums: Vec<[T; LANES]>,
 }
 
-impl PackedFactor {
+impl<T: Real> PackedFactor<T> {
     pub(super) fn new(factor: SupernodalLltRef<'_, u32, f64>) -> Self {
         let mut result = Self { size: factor.symbolic().nrows(), ..Self::default() };
         for index in 0..factor.symbolic().n_supernodes() {
@@ -89,7 +91,7 @@ impl PackedFactor {
                 for col in 0..width.min(first + ROWS) {
                     result.panels.push(std::array::from_fn(|lane| {
                         let row = first + lane;
-                        if row < row_count { packed[(row, col)] } else { 0.0 }
+                        if row < row_count { T::from_f64(packed[(row, col)]) } else { T::ZERO }
                     }));
                 }
             }
@@ -114,29 +116,28 @@ impl PackedFactor {
         self.supernodes.len()
     }
 
-    pub(super) fn workspace(&self) -> SolveWorkspace {
-        SolveWorkspace {
-            x: vec![0.0; 3 * self.size],
-            top: vec![0.0; 3 * self.widest],
-            rows: vec![0.0; 3 * self.longest],
-            sums: vec![[0.0; LANES]; 3 * self.widest],
-        }
+    /// Makes the memory large enough; it is so after the first time.
+    pub(super) fn fit(&self, work: &mut PackedWorkspace<T>) {
+        work.x.resize(3 * self.size, T::ZERO);
+        work.top.resize(3 * self.widest, T::ZERO);
+        work.rows.resize(3 * self.longest, T::ZERO);
+        work.sums.resize(3 * self.widest, [T::ZERO; LANES]);
     }
 
     pub(super) fn solve_in_place(
         &self,
         order: &[u32],
         rhs: &mut [[f64; 3]],
-        work: &mut SolveWorkspace,
+        work: &mut PackedWorkspace<T>,
     ) {
         assert_eq!(rhs.len(), order.len(), "one entry per node");
-        assert_eq!(work.x.len(), 3 * self.size, "workspace of this factor");
+        self.fit(work);
         for (x, &node) in work.x.as_chunks_mut::<3>().0.iter_mut().zip(order) {
-            *x = rhs[node as usize];
+            *x = rhs[node as usize].map(T::from_f64);
         }
-        pulp::Arch::new().dispatch(Passes::<1> { factor: self, work, first: 0 });
+        pulp::Arch::new().dispatch(Passes::<T, 1> { factor: self, work, first: 0 });
         for (x, &node) in work.x.as_chunks::<3>().0.iter().zip(order) {
-            rhs[node as usize] = *x;
+            rhs[node as usize] = x.map(T::to_f64);
         }
     }
 
@@ -144,17 +145,18 @@ impl PackedFactor {
         &self,
         order: &[u32],
         sides: &mut [[f64; 9]],
-        work: &mut SolveWorkspace,
+        work: &mut PackedWorkspace<T>,
     ) {
         assert_eq!(sides.len(), order.len(), "one entry per node");
-        assert_eq!(work.x.len(), 3 * self.size, "workspace of this factor");
+        self.fit(work);
         for (x, &node) in work.x.as_chunks_mut::<9>().0.iter_mut().zip(order) {
             let side = &sides[node as usize];
-            *x = std::array::from_fn(|entry| side[3 * (entry % 3) + entry / 3]);
+            *x = std::array::from_fn(|entry| T::from_f64(side[3 * (entry % 3) + entry / 3]));
         }
-        pulp::Arch::new().dispatch(Passes::<3> { factor: self, work, first: 0 });
+        pulp::Arch::new().dispatch(Passes::<T, 3> { factor: self, work, first: 0 });
         for (x, &node) in work.x.as_chunks::<9>().0.iter().zip(order) {
-            sides[node as usize] = std::array::from_fn(|entry| x[3 * (entry % 3) + entry / 3]);
+            let value = |entry: usize| x[3 * (entry % 3) + entry / 3].to_f64();
+            sides[node as usize] = std::array::from_fn(value);
         }
     }
 
@@ -163,35 +165,41 @@ impl PackedFactor {
         order: &[u32],
         node: usize,
         columns: &mut [[f64; 9]],
-        work: &mut SolveWorkspace,
+        work: &mut PackedWorkspace<T>,
     ) {
         assert_eq!(columns.len(), order.len(), "one entry per node");
-        assert_eq!(work.x.len(), 3 * self.size, "workspace of this factor");
+        self.fit(work);
         let Some(place) = order.iter().position(|&other| other as usize == node) else {
             columns.fill([0.0; 9]);
             return;
         };
-        work.x.fill(0.0);
+        work.x.fill(T::ZERO);
         for axis in 0..3 {
-            work.x[3 * (3 * place + axis) + axis] = 1.0;
+            work.x[3 * (3 * place + axis) + axis] = T::from_f64(1.0);
         }
-        pulp::Arch::new().dispatch(Passes::<3> { factor: self, work, first: 3 * place });
+        pulp::Arch::new().dispatch(Passes::<T, 3> { factor: self, work, first: 3 * place });
         for (x, &node) in work.x.as_chunks::<9>().0.iter().zip(order) {
-            columns[node as usize] = std::array::from_fn(|entry| x[3 * (entry % 3) + entry / 3]);
+            let value = |entry: usize| x[3 * (entry % 3) + entry / 3].to_f64();
+            columns[node as usize] = std::array::from_fn(value);
         }
     }
 
     /// Columns before `first` of the right-hand sides are zero.
     #[allow(clippy::inline_always)] // compiled for the vector unit that `dispatch` found
     #[inline(always)]
-    fn forward<S: Simd, const K: usize>(&self, simd: S, work: &mut SolveWorkspace, first: usize) {
+    fn forward<S: Simd, const K: usize>(
+        &self,
+        simd: S,
+        work: &mut PackedWorkspace<T>,
+        first: usize,
+    ) {
         let x = work.x.as_chunks_mut::<K>().0;
         let begin = self.supernodes.partition_point(|node| node.columns().end <= first);
         for supernode in &self.supernodes[begin..] {
             let width = supernode.width as usize;
             let top = &mut work.top.as_chunks_mut::<K>().0[..width];
             top.copy_from_slice(&x[supernode.columns()]);
-            if K > 1 && top.as_flattened().iter().all(|&value| value == 0.0) {
+            if K > 1 && top.as_flattened().iter().all(|&value| value == T::ZERO) {
                 continue;
             }
             let rows = work.rows.as_chunks_mut::<K>().0;
@@ -199,7 +207,7 @@ impl PackedFactor {
             for first in (0..supernode.row_count()).step_by(ROWS) {
                 let (panel, rest) = panels.split_at(width.min(first + ROWS));
                 panels = rest;
-                let sums = panel_product::<S, K>(simd, panel, top);
+                let sums = panel_product::<S, T, K>(simd, panel, top);
                 for (lane, row) in rows[first..first + ROWS].iter_mut().enumerate() {
                     for k in 0..K {
                         row[k] = sums[k][lane];
@@ -210,7 +218,8 @@ impl PackedFactor {
             x[supernode.columns()].copy_from_slice(rows_top);
             for (&row, value) in self.pattern[supernode.pattern()].iter().zip(rows_below) {
                 for k in 0..K {
-                    x[row as usize][k] -= value[k];
+                    let x = &mut x[row as usize][k];
+                    *x = *x - value[k];
                 }
             }
         }
@@ -218,7 +227,7 @@ impl PackedFactor {
 
     #[allow(clippy::inline_always)] // as `forward`
     #[inline(always)]
-    fn backward<S: Simd, const K: usize>(&self, simd: S, work: &mut SolveWorkspace) {
+    fn backward<S: Simd, const K: usize>(&self, simd: S, work: &mut PackedWorkspace<T>) {
         let x = work.x.as_chunks_mut::<K>().0;
         for supernode in self.supernodes.iter().rev() {
             let width = supernode.width as usize;
@@ -228,27 +237,28 @@ impl PackedFactor {
             let row_count = supernode.row_count();
             for (value, &row) in rows[width..row_count].iter_mut().zip(pattern) {
                 for k in 0..K {
-                    value[k] = -x[row as usize][k];
+                    value[k] = T::ZERO - x[row as usize][k];
                 }
             }
-            rows[row_count..row_count.next_multiple_of(ROWS)].fill([0.0; K]);
+            rows[row_count..row_count.next_multiple_of(ROWS)].fill([T::ZERO; K]);
             let sums = &mut work.sums[..K * width];
-            sums.fill([0.0; LANES]);
+            sums.fill([T::ZERO; LANES]);
             let mut panels = &self.panels[supernode.panel_start as usize..];
             for first in (0..row_count).step_by(ROWS) {
                 let (panel, rest) = panels.split_at(width.min(first + ROWS));
                 panels = rest;
-                let mut values = [[0.0; ROWS]; K];
+                let mut values = [[T::ZERO; ROWS]; K];
                 for (lane, row) in rows[first..first + ROWS].iter().enumerate() {
                     for k in 0..K {
                         values[k][lane] = row[k];
                     }
                 }
-                add_transposed_product::<S, K>(simd, panel, &values, sums.as_chunks_mut::<K>().0);
+                let sums = sums.as_chunks_mut::<K>().0;
+                add_transposed_product::<S, T, K>(simd, panel, &values, sums);
             }
             for (value, sums) in x[supernode.columns()].iter_mut().zip(sums.as_chunks::<K>().0) {
                 for k in 0..K {
-                    value[k] = sums[k].iter().sum();
+                    value[k] = sums[k].iter().fold(T::ZERO, |sum, &part| sum + part);
                 }
             }
         }
@@ -256,14 +266,14 @@ impl PackedFactor {
 }
 
 /// Both passes of a solve, for the vector unit that the machine has.
-struct Passes<'a, const K: usize> {
-    factor: &'a PackedFactor,
-    work: &'a mut SolveWorkspace,
+struct Passes<'a, T, const K: usize> {
+    factor: &'a PackedFactor<T>,
+    work: &'a mut PackedWorkspace<T>,
     /// Columns before this one of the right-hand sides are zero.
     first: usize,
 }
 
-impl<const K: usize> pulp::WithSimd for Passes<'_, K> {
+impl<T: Real, const K: usize> pulp::WithSimd for Passes<'_, T, K> {
     type Output = ();
 
     #[allow(clippy::inline_always)] // as `forward`
@@ -274,55 +284,74 @@ impl<const K: usize> pulp::WithSimd for Passes<'_, K> {
     }
 }
 
-/// Vectors that are summed at once: enough chains to hide the latency, few enough registers.
-const GROUP: usize = 2;
-
 /// `panel * top` for the rows of one panel.
 #[allow(clippy::inline_always)] // as `forward`
 #[inline(always)]
-fn panel_product<S: Simd, const K: usize>(
+fn panel_product<S: Simd, T: Real, const K: usize>(
     simd: S,
-    panel: &[Panel],
-    top: &[[f64; K]],
-) -> [[f64; ROWS]; K] {
-    let mut result = [[0.0; ROWS]; K];
-    for group in 0..ROWS / S::F64_LANES / GROUP {
-        let mut sums = [[simd.splat_f64s(0.0); GROUP]; K];
-        for (column, factor) in panel.iter().zip(top) {
-            let column = &S::as_simd_f64s(column).0[group * GROUP..][..GROUP];
-            for k in 0..K {
-                let factor = simd.splat_f64s(factor[k]);
-                for i in 0..GROUP {
-                    sums[k][i] = simd.mul_add_f64s(column[i], factor, sums[k][i]);
-                }
-            }
-        }
-        for k in 0..K {
-            let result = S::as_mut_simd_f64s(&mut result[k]).0;
-            result[group * GROUP..][..GROUP].copy_from_slice(&sums[k]);
+    panel: &[Panel<T>],
+    top: &[[T; K]],
+) -> [[T; ROWS]; K] {
+    let mut result = [[T::ZERO; ROWS]; K];
+    let count = ROWS / T::lanes::<S>();
+    let mut first = 0;
+    // As many chains at once as hide the latency of a multiplication and fit in the registers.
+    if K == 1 {
+        while first + 4 <= count {
+            rows_product::<S, T, K, 4>(simd, panel, top, first, &mut result);
+            first += 4;
         }
     }
+    while first + 2 <= count {
+        rows_product::<S, T, K, 2>(simd, panel, top, first, &mut result);
+        first += 2;
+    }
     result
+}
+
+/// `panel * top` for `G` vectors of rows from vector `first` on.
+#[allow(clippy::inline_always)] // as `forward`
+#[inline(always)]
+fn rows_product<S: Simd, T: Real, const K: usize, const G: usize>(
+    simd: S,
+    panel: &[Panel<T>],
+    top: &[[T; K]],
+    first: usize,
+    result: &mut [[T; ROWS]; K],
+) {
+    let mut sums = [[T::splat(simd, T::ZERO); G]; K];
+    for (column, factor) in panel.iter().zip(top) {
+        let column = &T::vectors::<S>(column)[first..first + G];
+        for k in 0..K {
+            let factor = T::splat(simd, factor[k]);
+            for i in 0..G {
+                sums[k][i] = T::mul_add(simd, column[i], factor, sums[k][i]);
+            }
+        }
+    }
+    for k in 0..K {
+        T::vectors_mut::<S>(&mut result[k])[first..first + G].copy_from_slice(&sums[k]);
+    }
 }
 
 /// Adds `panel^T * values` to the running sums of each column.
 #[allow(clippy::inline_always)] // as `forward`
 #[inline(always)]
-fn add_transposed_product<S: Simd, const K: usize>(
+fn add_transposed_product<S: Simd, T: Real, const K: usize>(
     simd: S,
-    panel: &[Panel],
-    values: &[[f64; ROWS]; K],
-    sums: &mut [[[f64; LANES]; K]],
+    panel: &[Panel<T>],
+    values: &[[T; ROWS]; K],
+    sums: &mut [[[T; LANES]; K]],
 ) {
-    let per_sum = LANES / S::F64_LANES;
+    let per_sum = LANES / T::lanes::<S>();
     for (column, sums) in panel.iter().zip(sums) {
-        let column = S::as_simd_f64s(column).0;
+        let column = T::vectors::<S>(column);
         for (sums, values) in sums.iter_mut().zip(values) {
-            let sums = S::as_mut_simd_f64s(sums).0;
-            let values = S::as_simd_f64s(values).0;
+            let sums = T::vectors_mut::<S>(sums);
+            let values = T::vectors::<S>(values);
             for i in 0..per_sum {
-                let half = simd.mul_add_f64s(column[i], values[i], sums[i]);
-                sums[i] = simd.mul_add_f64s(column[i + per_sum], values[i + per_sum], half);
+                let half = T::mul_add(simd, column[i], values[i], sums[i]);
+                sums[i] = T::mul_add(simd, column[i + per_sum], values[i + per_sum], half);
             }
         }
     }
