@@ -41,13 +41,9 @@ fn system(nodes: &[[f64; 3]], tetrahedra: &[[u32; 4]]) -> BlockMatrix {
         let (a, b, c) = (sub(a, o), sub(b, o), sub(c, o));
         let six_volumes = dot(a, cross(b, c));
         let volume = six_volumes / 6.0;
-        let mut gradients = [[0.0; 3], cross(b, c), cross(c, a), cross(a, b)];
-        for k in 0..3 {
-            for corner in 1..4 {
-                gradients[corner][k] /= six_volumes;
-                gradients[0][k] -= gradients[corner][k];
-            }
-        }
+        let inner = [cross(b, c), cross(c, a), cross(a, b)].map(|g| g.map(|x| x / six_volumes));
+        let first = std::array::from_fn(|k| -inner.iter().map(|g| g[k]).sum::<f64>());
+        let gradients = [first, inner[0], inner[1], inner[2]];
         for (&row, gi) in corners.iter().zip(gradients) {
             for (&col, gj) in corners.iter().zip(gradients) {
                 if col > row {
