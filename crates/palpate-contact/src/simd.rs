@@ -1,7 +1,7 @@
-//! Eight numbers at a time: one source for AVX2 and for plain Rust, with the same bits.
+//! Eight numbers at a time: one source for AVX2, AVX-512 and plain Rust, with the same bits.
 //!
-//! An algorithm is a [`Kernel`], written once over [`Lanes`]; [`Isa::run`] compiles it twice and picks
-//! at run time. No operation is fused, reordered or approximate, so both give the same results.
+//! An algorithm is a [`Kernel`], written once over [`Lanes`]; [`Isa::run`] compiles it for each and picks
+//! at run time. AVX-512 differs from AVX2 in the comparison of boxes alone, sixteen at a time. No operation is fused, reordered or approximate, so both give the same results.
 
 #![allow(unsafe_code)]
 #![allow(clippy::inline_always, reason = "what is not inlined is not compiled for the processor")]
@@ -9,6 +9,8 @@
 
 #[cfg(target_arch = "x86_64")]
 use std::arch::x86_64::*;
+#[cfg(target_arch = "x86_64")]
+use std::marker::PhantomData;
 
 /// What the processor can do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -17,22 +19,40 @@ pub(crate) enum Isa {
     Scalar,
     /// Only made by [`Isa::detect`], which has asked the processor.
     #[cfg(target_arch = "x86_64")]
-    Avx2(Avx2Token),
+    Avx2(Detected),
+    /// Likewise.
+    #[cfg(target_arch = "x86_64")]
+    Avx512(Detected),
 }
 
-/// Proof that the processor has AVX2.
+/// Proof that the processor was asked.
 #[cfg(target_arch = "x86_64")]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Avx2Token(());
+pub(crate) struct Detected(());
 
 impl Isa {
     /// The fastest that this processor has.
     pub(crate) fn detect() -> Self {
+        Self::all().into_iter().flatten().last().unwrap_or(Self::Scalar)
+    }
+
+    /// What this processor has, the fastest last.
+    pub(crate) fn all() -> [Option<Self>; 3] {
         #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx2") {
-            return Self::Avx2(Avx2Token(()));
+        {
+            let avx2 = std::arch::is_x86_feature_detected!("avx2");
+            let avx512 = avx2
+                && std::arch::is_x86_feature_detected!("avx512f")
+                && std::arch::is_x86_feature_detected!("avx512vl")
+                && std::arch::is_x86_feature_detected!("avx512dq");
+            [
+                Some(Self::Scalar),
+                avx2.then_some(Self::Avx2(Detected(()))),
+                avx512.then_some(Self::Avx512(Detected(()))),
+            ]
         }
-        Self::Scalar
+        #[cfg(not(target_arch = "x86_64"))]
+        [Some(Self::Scalar), None, None]
     }
 
     /// Runs a kernel.
@@ -43,6 +63,9 @@ impl Isa {
             // SAFETY: the token was made where AVX2 was detected.
             #[cfg(target_arch = "x86_64")]
             Self::Avx2(_) => unsafe { run_avx2(kernel) },
+            // SAFETY: likewise.
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512(_) => unsafe { run_avx512(kernel) },
         }
     }
 }
@@ -50,7 +73,13 @@ impl Isa {
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
 fn run_avx2<K: Kernel>(kernel: K) -> K::Output {
-    kernel.run::<Avx2>()
+    kernel.run::<Ymm<Avx2>>()
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,avx512f,avx512vl,avx512dq")]
+fn run_avx512<K: Kernel>(kernel: K) -> K::Output {
+    kernel.run::<Ymm<Avx512>>()
 }
 
 /// An algorithm over lanes. `run` is to be `#[inline(always)]`, with all that it calls, and to hold no
@@ -90,6 +119,31 @@ pub(crate) trait Lanes: Copy {
     fn min_of_each(rows: [Self; 8]) -> Self;
     /// Lane i of the result is the largest lane of `rows[i]`.
     fn max_of_each(rows: [Self; 8]) -> Self;
+    /// Which boxes meet: bit 8 i + j for box i of a and box j of b. Empty boxes, from infinity to minus
+    /// infinity along x, meet none and may be anything along y and z; elsewhere boxes are finite and
+    /// have no negative zero.
+    fn meet(a: EightBoxes, b: EightBoxes) -> u64;
+}
+
+/// The least and the largest x, y and z of eight boxes.
+pub(crate) type EightBoxes<'a> = [&'a [[f32; 8]; 3]; 2];
+
+/// [`Lanes::meet`], one box of a at a time.
+#[inline(always)]
+fn meet_by_box<L: Lanes>([min, max]: EightBoxes, b: EightBoxes) -> u64 {
+    let min_b = [L::load(&b[0][0]), L::load(&b[0][1]), L::load(&b[0][2])];
+    let max_b = [L::load(&b[1][0]), L::load(&b[1][1]), L::load(&b[1][2])];
+    let mut mask = 0;
+    for i in 0..8 {
+        let mut meet = L::splat(min[0][i]).le(max_b[0]);
+        meet = meet.and(min_b[0].le(L::splat(max[0][i])));
+        for axis in 1..3 {
+            meet = meet.and(L::splat(min[axis][i]).le(max_b[axis]));
+            meet = meet.and(min_b[axis].le(L::splat(max[axis][i])));
+        }
+        mask |= u64::from(meet.bits()) << (8 * i);
+    }
+    mask
 }
 
 /// The twin of plain Rust.
@@ -232,31 +286,45 @@ impl Lanes for Scalar {
     fn max_of_each(rows: [Self; 8]) -> Self {
         Self::fold_each(rows, greater)
     }
+
+    #[inline(always)]
+    fn meet(a: EightBoxes, b: EightBoxes) -> u64 {
+        meet_by_box::<Self>(a, b)
+    }
 }
 
-/// Eight lanes of AVX2. Values exist only within `run_avx2`.
+/// Eight lanes of AVX2. Values exist only within `run_avx2` and `run_avx512`.
 #[cfg(target_arch = "x86_64")]
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Avx2(__m256);
+pub(crate) struct Ymm<B>(__m256, PhantomData<B>);
+
+#[cfg(target_arch = "x86_64")]
+impl<B> Ymm<B> {
+    #[inline(always)]
+    fn of(lanes: __m256) -> Self {
+        Self(lanes, PhantomData)
+    }
+}
 
 /// An expression of intrinsics.
 #[cfg(target_arch = "x86_64")]
 macro_rules! avx2 {
     ($value:expr) => {
-        // SAFETY: methods of `Avx2` are only reached through `run_avx2`, where the processor has AVX2;
+        // SAFETY: methods of `Ymm` are only reached through `run_avx2` or `run_avx512`, where the
+        // processor has what they use;
         // loads and stores are unaligned ones, within the arrays that are borrowed for them.
         unsafe { $value }
     };
 }
 
 #[cfg(target_arch = "x86_64")]
-impl Avx2 {
+impl<B: BoxTest> Ymm<B> {
     /// The lanes 0, 2 and 1, 3 of each half of a and b.
     #[inline(always)]
     fn even_and_odd(a: Self, b: Self) -> [Self; 2] {
         avx2!([
-            Self(_mm256_shuffle_ps::<0b10_00_10_00>(a.0, b.0)),
-            Self(_mm256_shuffle_ps::<0b11_01_11_01>(a.0, b.0)),
+            Self::of(_mm256_shuffle_ps::<0b10_00_10_00>(a.0, b.0)),
+            Self::of(_mm256_shuffle_ps::<0b11_01_11_01>(a.0, b.0)),
         ])
     }
 
@@ -264,8 +332,8 @@ impl Avx2 {
     #[inline(always)]
     fn halves(a: Self, b: Self) -> [Self; 2] {
         avx2!([
-            Self(_mm256_permute2f128_ps::<0x20>(a.0, b.0)),
-            Self(_mm256_permute2f128_ps::<0x31>(a.0, b.0)),
+            Self::of(_mm256_permute2f128_ps::<0x20>(a.0, b.0)),
+            Self::of(_mm256_permute2f128_ps::<0x31>(a.0, b.0)),
         ])
     }
 }
@@ -287,10 +355,10 @@ macro_rules! fold_each {
 }
 
 #[cfg(target_arch = "x86_64")]
-impl Lanes for Avx2 {
+impl<B: BoxTest> Lanes for Ymm<B> {
     #[inline(always)]
     fn load(from: &[f32; 8]) -> Self {
-        Self(avx2!(_mm256_loadu_ps(from.as_ptr())))
+        Self::of(avx2!(_mm256_loadu_ps(from.as_ptr())))
     }
 
     #[inline(always)]
@@ -300,7 +368,7 @@ impl Lanes for Avx2 {
 
     #[inline(always)]
     fn splat(value: f32) -> Self {
-        Self(avx2!(_mm256_set1_ps(value)))
+        Self::of(avx2!(_mm256_set1_ps(value)))
     }
 
     #[inline(always)]
@@ -318,76 +386,76 @@ impl Lanes for Avx2 {
             let (xy01, xy23) = (_mm256_unpacklo_ps(n04, n15), _mm256_unpacklo_ps(n26, n37));
             let (z01, z23) = (_mm256_unpackhi_ps(n04, n15), _mm256_unpackhi_ps(n26, n37));
             [
-                Self(_mm256_shuffle_ps::<0b01_00_01_00>(xy01, xy23)),
-                Self(_mm256_shuffle_ps::<0b11_10_11_10>(xy01, xy23)),
-                Self(_mm256_shuffle_ps::<0b01_00_01_00>(z01, z23)),
+                Self::of(_mm256_shuffle_ps::<0b01_00_01_00>(xy01, xy23)),
+                Self::of(_mm256_shuffle_ps::<0b11_10_11_10>(xy01, xy23)),
+                Self::of(_mm256_shuffle_ps::<0b01_00_01_00>(z01, z23)),
             ]
         })
     }
 
     #[inline(always)]
     fn add(self, other: Self) -> Self {
-        Self(avx2!(_mm256_add_ps(self.0, other.0)))
+        Self::of(avx2!(_mm256_add_ps(self.0, other.0)))
     }
 
     #[inline(always)]
     fn sub(self, other: Self) -> Self {
-        Self(avx2!(_mm256_sub_ps(self.0, other.0)))
+        Self::of(avx2!(_mm256_sub_ps(self.0, other.0)))
     }
 
     #[inline(always)]
     fn mul(self, other: Self) -> Self {
-        Self(avx2!(_mm256_mul_ps(self.0, other.0)))
+        Self::of(avx2!(_mm256_mul_ps(self.0, other.0)))
     }
 
     #[inline(always)]
     fn div(self, other: Self) -> Self {
-        Self(avx2!(_mm256_div_ps(self.0, other.0)))
+        Self::of(avx2!(_mm256_div_ps(self.0, other.0)))
     }
 
     #[inline(always)]
     fn sqrt(self) -> Self {
-        Self(avx2!(_mm256_sqrt_ps(self.0)))
+        Self::of(avx2!(_mm256_sqrt_ps(self.0)))
     }
 
     #[inline(always)]
     fn abs(self) -> Self {
-        Self(avx2!(_mm256_andnot_ps(_mm256_set1_ps(-0.0), self.0)))
+        Self::of(avx2!(_mm256_andnot_ps(_mm256_set1_ps(-0.0), self.0)))
     }
 
     #[inline(always)]
     fn min(self, other: Self) -> Self {
-        Self(avx2!(_mm256_min_ps(self.0, other.0)))
+        Self::of(avx2!(_mm256_min_ps(self.0, other.0)))
     }
 
     #[inline(always)]
     fn max(self, other: Self) -> Self {
-        Self(avx2!(_mm256_max_ps(self.0, other.0)))
+        Self::of(avx2!(_mm256_max_ps(self.0, other.0)))
     }
 
     #[inline(always)]
     fn le(self, other: Self) -> Self {
-        Self(avx2!(_mm256_cmp_ps::<_CMP_LE_OQ>(self.0, other.0)))
+        Self::of(avx2!(_mm256_cmp_ps::<_CMP_LE_OQ>(self.0, other.0)))
     }
 
     #[inline(always)]
     fn gt(self, other: Self) -> Self {
-        Self(avx2!(_mm256_cmp_ps::<_CMP_GT_OQ>(self.0, other.0)))
+        Self::of(avx2!(_mm256_cmp_ps::<_CMP_GT_OQ>(self.0, other.0)))
     }
 
     #[inline(always)]
     fn and(self, other: Self) -> Self {
-        Self(avx2!(_mm256_and_ps(self.0, other.0)))
+        Self::of(avx2!(_mm256_and_ps(self.0, other.0)))
     }
 
     #[inline(always)]
     fn or(self, other: Self) -> Self {
-        Self(avx2!(_mm256_or_ps(self.0, other.0)))
+        Self::of(avx2!(_mm256_or_ps(self.0, other.0)))
     }
 
     #[inline(always)]
     fn blend(self, other: Self, mask: Self) -> Self {
-        Self(avx2!(_mm256_blendv_ps(self.0, other.0, mask.0)))
+        Self::of(avx2!(_mm256_blendv_ps(self.0, other.0, mask.0)))
     }
 
     #[inline(always)]
@@ -404,81 +472,79 @@ impl Lanes for Avx2 {
     fn max_of_each(rows: [Self; 8]) -> Self {
         fold_each!(rows, max)
     }
+
+    #[inline(always)]
+    fn meet(a: EightBoxes, b: EightBoxes) -> u64 {
+        B::meet(a, b)
+    }
+}
+
+/// How [`Ymm`] compares boxes.
+#[cfg(target_arch = "x86_64")]
+pub(crate) trait BoxTest: Copy {
+    fn meet(a: EightBoxes, b: EightBoxes) -> u64;
+}
+
+/// One box against eight.
+#[cfg(target_arch = "x86_64")]
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Avx2;
+
+#[cfg(target_arch = "x86_64")]
+impl BoxTest for Avx2 {
+    #[inline(always)]
+    fn meet(a: EightBoxes, b: EightBoxes) -> u64 {
+        meet_by_box::<Ymm<Self>>(a, b)
+    }
+}
+
+/// Two boxes against eight.
+#[cfg(target_arch = "x86_64")]
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Avx512;
+
+#[cfg(target_arch = "x86_64")]
+impl BoxTest for Avx512 {
+    /// By the signs of differences: comparisons and permutations would wait for one unit.
+    #[inline(always)]
+    fn meet([min_a, max_a]: EightBoxes, [min_b, max_b]: EightBoxes) -> u64 {
+        avx2!({
+            let first = _mm512_setr_epi32(0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1);
+            let mut apart = [_mm512_setzero_si512(); 4];
+            for axis in 0..3 {
+                let (min_a, max_a) = (twice(&min_a[axis]), twice(&max_a[axis]));
+                let (min_b, max_b) = (twice(&min_b[axis]), twice(&max_b[axis]));
+                for (i, apart) in (0..).step_by(2).zip(&mut apart) {
+                    // Boxes i and i + 1 of a.
+                    let two = _mm512_add_epi32(first, _mm512_set1_epi32(i));
+                    let below = _mm512_sub_ps(max_b, _mm512_permutexvar_ps(two, min_a));
+                    let above = _mm512_sub_ps(_mm512_permutexvar_ps(two, max_a), min_b);
+                    let (below, above) = (_mm512_castps_si512(below), _mm512_castps_si512(above));
+                    *apart = _mm512_ternarylogic_epi32::<OR>(*apart, below, above);
+                }
+            }
+            let mut mask = 0;
+            for (i, apart) in apart.into_iter().enumerate() {
+                mask |= u64::from(_mm512_movepi32_mask(apart)) << (16 * i);
+            }
+            !mask
+        })
+    }
+}
+
+/// Any of three bits, for `_mm512_ternarylogic_epi32`.
+#[cfg(target_arch = "x86_64")]
+const OR: i32 = 0xfe;
+
+/// The same eight numbers in both halves.
+#[cfg(target_arch = "x86_64")]
+#[inline(always)]
+fn twice(values: &[f32; 8]) -> __m512 {
+    avx2!({
+        let half = _mm512_castps256_ps512(_mm256_loadu_ps(values.as_ptr()));
+        _mm512_shuffle_f32x4::<0b01_00_01_00>(half, half)
+    })
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    const VALUES: [f32; 12] = [
-        0.0,
-        -0.0,
-        1.0,
-        -1.5,
-        f32::MAX,
-        f32::MIN_POSITIVE,
-        1e-45,
-        -3e-39,
-        f32::INFINITY,
-        f32::NEG_INFINITY,
-        f32::NAN,
-        0.1,
-    ];
-
-    /// All results on some lanes; NaN of any kind counts as one.
-    struct All([[f32; 8]; 3]);
-
-    impl Kernel for All {
-        type Output = Vec<u32>;
-
-        #[inline(always)]
-        fn run<L: Lanes>(self) -> Vec<u32> {
-            let [a, b, c] = [L::load(&self.0[0]), L::load(&self.0[1]), L::load(&self.0[2])];
-            let numbers = [a.add(b), a.sub(b), a.mul(b), a.div(b), a.sqrt(), a.min(b), a.max(b)];
-            let more = [
-                a.abs(),
-                a.blend(b, b.le(c)),
-                L::splat(self.0[0][3]),
-                L::min_of_each([a, b, c, a.add(b), b.min(a), c.sub(a), b, b.abs()]),
-                L::max_of_each([a, b, c, a.add(b), b.min(a), c.sub(a), b, b.abs()]),
-            ];
-            let mut bits = vec![a.le(b).bits(), a.gt(b).bits(), a.bits()];
-            bits.push(a.le(b).and(b.le(c)).bits());
-            bits.push(a.le(b).or(b.le(c)).bits());
-            let mut stored = [0.0; 8];
-            for lanes in numbers.into_iter().chain(more) {
-                lanes.store(&mut stored);
-                bits.extend(stored.map(|v| if v.is_nan() { u32::MAX } else { v.to_bits() }));
-            }
-            let nodes = self.0.map(|[x, y, z, w, ..]| [x, y, z, w]);
-            let [p, q, r] = [&nodes[0], &nodes[1], &nodes[2]];
-            for lanes in L::gather([p, q, r, q, p, r, r, q]) {
-                lanes.store(&mut stored);
-                bits.extend(stored.map(f32::to_bits));
-            }
-            bits
-        }
-    }
-
-    #[test]
-    fn both_paths_give_the_same_bits() {
-        let fast = Isa::detect();
-        let mut state = 1_usize;
-        for _ in 0..20_000 {
-            let mut value = || {
-                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(99);
-                VALUES[(state >> 33) % VALUES.len()]
-            };
-            let lanes: [[f32; 8]; 3] = std::array::from_fn(|_| std::array::from_fn(|_| value()));
-            assert_eq!(fast.run(All(lanes)), Isa::Scalar.run(All(lanes)), "{lanes:?}");
-        }
-    }
-
-    #[test]
-    fn this_machine_says_what_it_has() {
-        #[cfg(target_arch = "x86_64")]
-        assert_eq!(Isa::detect() != Isa::Scalar, std::arch::is_x86_feature_detected!("avx2"));
-        #[cfg(not(target_arch = "x86_64"))]
-        assert_eq!(Isa::detect(), Isa::Scalar);
-    }
-}
+mod tests;

@@ -118,16 +118,16 @@ impl WideBody {
     /// likewise edges, and the nodes of a against the triangles of b.
     pub(crate) fn triangles_and_triangles<'a>(&'a self, b: &'a Self, margin: f64) -> Sides<'a> {
         let own = std::ptr::eq(self, b).then_some(&self.triangles_of_triangles);
-        Sides { a: &self.triangles, b: &b.triangles, same: own.is_some(), own, margin }
+        Sides::new([&self.triangles, &b.triangles], own, own.is_some(), margin)
     }
 
     pub(crate) fn edges_and_edges<'a>(&'a self, b: &'a Self, margin: f64) -> Sides<'a> {
         let own = std::ptr::eq(self, b).then_some(&self.edges_of_edges);
-        Sides { a: &self.edges, b: &b.edges, same: own.is_some(), own, margin }
+        Sides::new([&self.edges, &b.edges], own, own.is_some(), margin)
     }
 
     pub(crate) fn points_and_triangles<'a>(&'a self, b: &'a Self, margin: f64) -> Sides<'a> {
         let own = std::ptr::eq(self, b).then_some(&self.triangles_of_points);
-        Sides { a: &self.points, b: &b.triangles, same: false, own, margin }
+        Sides::new([&self.points, &b.triangles], own, false, margin)
     }
 }

@@ -25,7 +25,7 @@ pub(crate) struct Adjacency {
     /// Rows of `parents`, by block of level 1.
     parent_rows: Vec<u32>,
     /// Pairs of blocks of level 1 as (second block, child pairs that are in `pairs`).
-    parents: Vec<(u32, u64)>,
+    pub(super) parents: Vec<(u32, u64)>,
 }
 
 impl Adjacency {

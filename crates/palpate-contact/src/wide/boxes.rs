@@ -3,7 +3,7 @@
 use palpate_geometry::Point;
 
 use super::WIDTH;
-use crate::simd::{Isa, Kernel, Lanes};
+use crate::simd::{EightBoxes, Isa, Kernel, Lanes};
 
 /// Eight boxes: three cache lines.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -19,6 +19,12 @@ impl Block {
     /// Boxes that meet nothing.
     pub(crate) const EMPTY: Self =
         Self { min: [[f32::INFINITY; WIDTH]; 3], max: [[f32::NEG_INFINITY; WIDTH]; 3] };
+
+    /// The least and the largest corners.
+    #[inline(always)]
+    pub(super) fn sides(&self) -> EightBoxes<'_> {
+        [&self.min, &self.max]
+    }
 }
 
 /// Outward rounding: a value of `f32` that stands for a real number x is at most this part of x, or

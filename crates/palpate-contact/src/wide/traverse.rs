@@ -22,14 +22,38 @@ pub(crate) struct Sides<'a> {
     pub(crate) a: &'a Hierarchy,
     pub(crate) b: &'a Hierarchy,
     /// Whether a and b are one and the same: each unordered pair is then met once.
-    pub(super) same: bool,
+    same: bool,
     /// For one body: what shares a node.
-    pub(super) own: Option<&'a Adjacency>,
+    own: Option<&'a Adjacency>,
     /// Boxes further apart than this [m] are not wanted.
-    pub(super) margin: f64,
+    margin: f64,
+    padding: Option<f32>,
 }
 
-impl Sides<'_> {
+impl<'a> Sides<'a> {
+    pub(super) fn new(
+        [a, b]: [&'a Hierarchy; 2],
+        own: Option<&'a Adjacency>,
+        same: bool,
+        margin: f64,
+    ) -> Self {
+        let largest = a.largest_coordinate().max(b.largest_coordinate());
+        Self { a, b, same, own, margin, padding: padding(margin, largest) }
+    }
+
+    fn overlap<'b>(
+        &self,
+        level: usize,
+        pairs: &'b [[u32; 2]],
+        masks: &'b mut Vec<u64>,
+    ) -> Overlap<'b>
+    where
+        'a: 'b,
+    {
+        let (margin, padding) = (self.margin, self.padding);
+        Overlap { a: self.a.level(level), b: self.b.level(level), pairs, margin, padding, masks }
+    }
+
     /// The level of the first block pair (0, 0); `None` where there is nothing to traverse: no elements,
     /// or one block of each, of one body.
     pub(crate) fn top(&self) -> Option<usize> {
@@ -100,8 +124,7 @@ impl Traversal {
         };
         let pairs = &adjacency.pairs[range.clone()];
         self.masks.clear();
-        let (a, b, margin) = (sides.a.level(0), sides.b.level(0), sides.margin);
-        isa.run(Overlap { a, b, pairs, margin, masks: &mut self.masks });
+        isa.run(sides.overlap(0, pairs, &mut self.masks));
         cost.count(pairs.len());
         cost.leaf_pairs += pairs.len() as u64;
         for ((&pair, &mask), &apart) in pairs.iter().zip(&self.masks).zip(&adjacency.apart[range]) {
@@ -110,11 +133,9 @@ impl Traversal {
     }
 
     fn test(&mut self, isa: Isa, sides: &Sides, level: usize, cost: &mut Cost) {
-        let (a, b) = (sides.a.level(level), sides.b.level(level));
         self.masks.clear();
-        let (pairs, margin, masks) = (&self.pairs, sides.margin, &mut self.masks);
-        isa.run(Overlap { a, b, pairs, margin, masks });
-        cost.count(pairs.len());
+        isa.run(sides.overlap(level, &self.pairs, &mut self.masks));
+        cost.count(self.pairs.len());
     }
 }
 
@@ -139,6 +160,8 @@ pub(super) struct Overlap<'a> {
     pub(super) b: &'a [Block],
     pub(super) pairs: &'a [[u32; 2]],
     pub(super) margin: f64,
+    /// By [`padding`] of the margin.
+    pub(super) padding: Option<f32>,
     pub(super) masks: &'a mut Vec<u64>,
 }
 
@@ -147,49 +170,65 @@ impl Kernel for Overlap<'_> {
 
     #[inline(always)]
     fn run<L: Lanes>(self) {
-        let Self { a, b, pairs, margin, masks } = self;
+        let Self { a, b, pairs, margin, padding, masks } = self;
         // Plain loops: what an iterator's adaptor does not inline is not compiled for the lanes.
         masks.resize(pairs.len(), 0);
-        if margin > 0.0 {
+        if let Some(padding) = padding {
+            let padding = L::splat(padding);
+            for (mask, &[i, j]) in masks.iter_mut().zip(pairs) {
+                // b, which a kernel holds in registers; a may be read number by number.
+                let b = padded(&b[j as usize], padding);
+                *mask = L::meet(a[i as usize].sides(), b.sides());
+            }
+        } else if margin > 0.0 {
             let margin = L::splat(round_up(margin));
             for (mask, &[i, j]) in masks.iter_mut().zip(pairs) {
-                *mask = overlaps::<L>(&widened(&a[i as usize], margin), &b[j as usize]);
+                let b = widened(&b[j as usize], margin);
+                *mask = L::meet(a[i as usize].sides(), b.sides());
             }
         } else {
             for (mask, &[i, j]) in masks.iter_mut().zip(pairs) {
-                *mask = overlaps::<L>(&a[i as usize], &b[j as usize]);
+                *mask = L::meet(a[i as usize].sides(), b[j as usize].sides());
             }
         }
     }
 }
 
-#[inline(always)]
-fn overlaps<L: Lanes>(a: &Block, b: &Block) -> u64 {
-    let b_min = [L::load(&b.min[0]), L::load(&b.min[1]), L::load(&b.min[2])];
-    let b_max = [L::load(&b.max[0]), L::load(&b.max[1]), L::load(&b.max[2])];
-    let mut mask = 0;
-    for i in 0..WIDTH {
-        let mut meet = L::splat(a.min[0][i]).le(b_max[0]);
-        meet = meet.and(b_min[0].le(L::splat(a.max[0][i])));
-        for axis in 1..3 {
-            meet = meet.and(L::splat(a.min[axis][i]).le(b_max[axis]));
-            meet = meet.and(b_min[axis].le(L::splat(a.max[axis][i])));
-        }
-        mask |= u64::from(meet.bits()) << (WIDTH * i);
-    }
-    mask
+/// What makes up for a margin and for the rounding of coordinates up to `largest` that are moved by it;
+/// `None` where there is no margin, or coordinates could overflow.
+pub(super) fn padding(margin: f64, largest: f32) -> Option<f32> {
+    const ROUNDING: f32 = 2.0 * f32::EPSILON;
+    let padding = round_up(margin) * (1.0 + ROUNDING) + largest * ROUNDING;
+    (margin > 0.0 && padding + largest < f32::MAX / 2.0).then_some(padding)
 }
 
-/// Boxes grown by `margin` and rounded outwards. Empty boxes stay empty, or become NaN, which meets
-/// nothing either.
+/// Boxes grown by [`padding`].
+#[inline(always)]
+fn padded<L: Lanes>(block: &Block, padding: L) -> Block {
+    let mut wide = Block::EMPTY;
+    for axis in 0..3 {
+        L::load(&block.min[axis]).sub(padding).store(&mut wide.min[axis]);
+        L::load(&block.max[axis]).add(padding).store(&mut wide.max[axis]);
+    }
+    wide
+}
+
+/// Boxes of any size grown by `margin` and rounded outwards. Empty boxes stay empty along x.
 #[inline(always)]
 fn widened<L: Lanes>(block: &Block, margin: L) -> Block {
     let mut wide = Block::EMPTY;
     for axis in 0..3 {
-        let min = L::load(&block.min[axis]).sub(margin);
-        let max = L::load(&block.max[axis]).add(margin);
-        at_least_lowest(min.sub(rounding(min))).store(&mut wide.min[axis]);
-        at_most_largest(max.add(rounding(max))).store(&mut wide.max[axis]);
+        let (least, largest) = (L::load(&block.min[axis]), L::load(&block.max[axis]));
+        let (min, max) = (least.sub(margin), largest.add(margin));
+        let mut min = at_least_lowest(min.sub(rounding(min)));
+        let mut max = at_most_largest(max.add(rounding(max)));
+        if axis == 0 {
+            let empty = least.gt(largest);
+            min = min.blend(L::splat(f32::INFINITY), empty);
+            max = max.blend(L::splat(f32::NEG_INFINITY), empty);
+        }
+        min.store(&mut wide.min[axis]);
+        max.store(&mut wide.max[axis]);
     }
     wide
 }
