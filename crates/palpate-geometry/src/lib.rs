@@ -13,7 +13,9 @@ pub mod vec3;
 
 pub use aabb::Aabb;
 pub use distance::{EdgeEdge, PointTriangle, TriangleFeature, edge_edge, point_triangle};
-pub use intersection::triangles_intersect;
+pub use intersection::{
+    triangles_intersect, triangles_intersect_beyond_edge, triangles_intersect_beyond_node,
+};
 
 /// A position or vector in space, metres.
 pub type Point = [f64; 3];

@@ -3,6 +3,7 @@
 mod distance;
 mod integers;
 mod intersection;
+mod neighbours;
 mod oracle;
 mod predicates;
 mod strategies;

@@ -6,6 +6,7 @@
 //! Its end is checked here: either the weights name a common point, or the dual prices are the
 //! normal of a plane strictly between the hulls.
 
+use num_bigint::BigInt;
 use palpate_geometry::Point;
 
 use crate::integers::{Integer, Vector, dot, integer_points, narrow};
@@ -18,6 +19,13 @@ pub(crate) fn hulls_intersect(a: &[Point], b: &[Point]) -> bool {
     } else {
         decide(&points[..a.len()], &points[a.len()..])
     }
+}
+
+/// Whether zero is in the hull of `vectors`: whether they have a sum of zero with weights that are not
+/// negative, and not all zero.
+pub(crate) fn hull_holds_zero(vectors: &[Vector<BigInt>]) -> bool {
+    let zero = std::array::from_fn(|_| BigInt::ZERO);
+    decide(&[zero], vectors)
 }
 
 const ROWS: usize = 5;
