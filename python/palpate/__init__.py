@@ -1,7 +1,7 @@
 """Real-time contact detection and deformation for soft bodies made of tetrahedra."""
 
 from palpate._core import __version__
-from palpate.contacts import DetectionStats, Intersections
+from palpate.contacts import DetectionStats, Intersections, Proximity
 from palpate.errors import (
     CheckpointError,
     Diagnostic,
@@ -31,6 +31,7 @@ __all__ = [
     "Model",
     "ModelError",
     "PalpateError",
+    "Proximity",
     "RigidKey",
     "Scene",
     "Simulation",

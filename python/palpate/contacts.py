@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
-from palpate._arrays import IndexArray
+from palpate._arrays import Float64Array, IndexArray
 
 
 @dataclass(frozen=True)
@@ -58,3 +59,48 @@ class Intersections:
 
     def __repr__(self) -> str:
         return f"Intersections({len(self)} pairs, {self.stats.fraction:.2g} of all pairs tested)"
+
+
+@dataclass(frozen=True, eq=False)
+class Proximity:
+    """Surface elements closer than the asked distance, sorted by (kind, bodies, elements).
+
+    The pair's elements share no node. All arrays are read-only, one row per pair:
+
+    ``kind`` (k,)
+        `VERTEX_TRIANGLE` or `EDGE_EDGE`.
+    ``bodies`` (k, 2)
+        Body of side a (the node, or the first edge) and of side b.
+    ``elements`` (k, 2)
+        Node and triangle, or two rows of `Mesh.surface_edges`.
+    ``nodes`` (k, 4)
+        The node and the triangle's three, or the edges' two and two.
+    ``weights`` (k, 4)
+        Of the closest points: positive on side a, negative on side b, sum 0. They are the contact's
+        Jacobian: the gap is the weighted sum of the nodes' positions along the normal.
+    ``normals`` (k, 3)
+        Unit vectors from side b to side a; a normal of the elements where the distance is 0.
+    ``distances`` (k,)
+        [m]
+    """
+
+    kind: IndexArray
+    bodies: IndexArray
+    elements: IndexArray
+    nodes: IndexArray
+    weights: Float64Array
+    normals: Float64Array
+    distances: Float64Array
+    stats: DetectionStats
+
+    #: A node of body a and a triangle of body b.
+    VERTEX_TRIANGLE: ClassVar[int] = 0
+    #: An edge of each body.
+    EDGE_EDGE: ClassVar[int] = 1
+
+    def __len__(self) -> int:
+        return len(self.kind)
+
+    def __repr__(self) -> str:
+        edges = int((self.kind == self.EDGE_EDGE).sum())
+        return f"Proximity({len(self) - edges} vertex-triangle pairs, {edges} edge-edge pairs)"

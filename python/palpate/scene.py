@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from palpate import _arrays, _core
 from palpate._arrays import Float64Array, IndexArray
-from palpate.contacts import DetectionStats, Intersections
+from palpate.contacts import DetectionStats, Intersections, Proximity
 from palpate.mesh import Mesh, as_mesh
 from palpate.model import Body, Model, body_index, read_model
 
@@ -132,10 +132,36 @@ class Scene:
         """Current node positions [m] of a body, shape (n, 3), read-only."""
         return self._core.positions(body_index(self._names, body))
 
-    def intersections(self, *, self_contact: bool = True, same_leaf: bool = True) -> Intersections:
+    def ignore(self, body_a: int | str, body_b: int | str, ignored: bool = True) -> None:
+        """Leave two bodies out of every query, or take them in again.
+
+        The same body twice is its self-contact. `replace` keeps what is ignored.
+        """
+        index_a, index_b = body_index(self._names, body_a), body_index(self._names, body_b)
+        self._core.ignore(index_a, index_b, bool(ignored))
+
+    def set_groups(self, body: int | str, groups: npt.ArrayLike) -> None:
+        """Put the surface triangles of a body into groups, within which nothing is tested.
+
+        Two triangles in the same group, whatever their bodies, are no pair in `intersections` and
+        `contact_nodes`. A node or an edge is in the groups of all triangles around it, and two
+        elements with a group in common are no pair in `proximity`. `replace` ends a body's groups.
+
+        Parameters
+        ----------
+        groups : (m,) integers
+            Group of each surface triangle; 0 for none.
+        """
+        index = body_index(self._names, body)
+        self._core.set_groups(index, _arrays.indices(groups, "groups", None))
+
+    def intersections(
+        self, *, self_contact: bool = True, same_leaf: bool = True, shared_nodes: bool = False
+    ) -> Intersections:
         """Every pair of surface triangles that meet, decided exactly for the given positions.
 
-        Touching and coplanar overlap count; two triangles of one body that share a node do not.
+        Touching and coplanar overlap count; two triangles of one body that share a node do not,
+        unless ``shared_nodes`` is True.
 
         Parameters
         ----------
@@ -144,9 +170,42 @@ class Scene:
         same_leaf : bool
             Whether triangles in one leaf are tested against each other. The paper leaves them out;
             with True the result is complete at any leaf size.
+        shared_nodes : bool
+            Whether triangles of one body that share nodes count where they meet elsewhere too: in a
+            point other than the node they share, or beyond the edge they share (one is then folded
+            flat over the other). So folds show, and fronts of cuts that run into themselves.
         """
-        pairs, stats = self._core.intersections(bool(self_contact), bool(same_leaf))
+        options = bool(self_contact), bool(same_leaf), bool(shared_nodes)
+        pairs, stats = self._core.intersections(*options)
         return Intersections(pairs, DetectionStats(*stats))
+
+    def proximity(
+        self, distance: float, *, self_contact: bool = True, close_at_rest: bool = True
+    ) -> Proximity:
+        """Every vertex-triangle and edge-edge pair closer than a distance.
+
+        The two elements share no node; the triangles they belong to may. Between two bodies, nodes
+        of each are held against triangles of the other.
+
+        Parameters
+        ----------
+        distance : float
+            [m], positive; pairs exactly as far apart do not count.
+        self_contact : bool
+            Whether pairs within one body count.
+        close_at_rest : bool
+            Whether pairs count that are closer than ``distance`` in the positions of the meshes
+            already, such as the two sides of a thin wall.
+        """
+        distance = _arrays.scalar(distance, "distance")
+        if distance <= 0:
+            raise ValueError(f"distance: expected a positive number of metres, got {distance}")
+        found = self._core.proximity(distance, bool(self_contact), bool(close_at_rest))
+        return Proximity(*found[:-1], DetectionStats(*found[-1]))
+
+    def contact_nodes(self, *, self_contact: bool = True) -> tuple[IndexArray, ...]:
+        """Nodes of the triangles that meet, sorted, one array per body: the paper's own output."""
+        return self._core.contact_nodes(bool(self_contact))
 
     def tree_stats(self, body: int | str) -> dict[str, Any]:
         """Counts of a body's bounding tree: nodes, leaves, depth, how full the leaves are."""

@@ -98,7 +98,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             last = scene.intersections(&IntersectionOptions::default()).stats;
             times[1].push(last.traversal_time + last.object_time);
             times[2].push(last.polygon_time);
-            let others = IntersectionOptions { self_contact: false, same_leaf: true };
+            let others = IntersectionOptions { self_contact: false, ..Default::default() };
             let without = scene.intersections(&others).stats.total_time();
             times[3].push(last.total_time().saturating_sub(without));
             times[4].push(scene.proximity(&|_, _| Some(0.05 * edge)).stats.total_time());

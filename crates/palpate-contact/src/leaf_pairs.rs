@@ -7,6 +7,7 @@ use palpate_geometry::Aabb;
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
+use crate::proximity::Limit;
 use crate::scene::{DetectionStats, Frame};
 
 /// Leaves that one thread takes at a time.
@@ -17,24 +18,24 @@ const LEAVES_PER_TASK: usize = 256;
 pub(crate) struct BodyPair {
     pub(crate) a: u32,
     pub(crate) b: u32,
-    /// Elements closer than this \[m\] are wanted; zero where they must meet.
-    pub(crate) distance: f64,
-    /// `distance` widened by rounding: boxes further apart hold nothing wanted.
+    /// Which elements are wanted; of no use where they must meet.
+    pub(crate) limit: Limit,
+    /// The limit's distance \[m\] widened by rounding: boxes further apart hold nothing wanted.
     pub(crate) margin: f64,
 }
 
 impl BodyPair {
     pub(crate) fn meeting(a: u32, b: u32) -> Self {
-        Self { a, b, distance: 0.0, margin: 0.0 }
+        Self { a, b, limit: Limit { distance: 0.0, close_at_rest: true }, margin: 0.0 }
     }
 
-    pub(crate) fn within(a: u32, b: u32, distance: f64, scene_bounds: &Aabb) -> Self {
+    pub(crate) fn within(a: u32, b: u32, limit: Limit, scene_bounds: &Aabb) -> Self {
         let corners = scene_bounds.min.iter().chain(&scene_bounds.max);
         let largest = corners.fold(0.0_f64, |largest, value| largest.max(value.abs()));
         let rounding = if largest.is_finite() { 64.0 * f64::EPSILON * largest } else { 0.0 };
         // A finite cap keeps the empty box empty when it is widened.
-        let margin = (distance * (1.0 + 1e-9) + rounding).min(1e300);
-        Self { a, b, distance, margin }
+        let margin = (limit.distance * (1.0 + 1e-9) + rounding).min(1e300);
+        Self { a, b, limit, margin }
     }
 
     pub(crate) fn is_self(&self) -> bool {

@@ -28,7 +28,9 @@
 
 pub mod bounding_tree;
 mod leaf_pairs;
+mod left_out;
 mod method;
+mod neighbours;
 pub mod pairs;
 mod penetration;
 mod proximity;
@@ -41,6 +43,6 @@ mod wide;
 pub use bounding_tree::{BoundingTree, Split, TreeDefect, TreeStats};
 pub use pairs::{PairKind, PenetratingNode, ProximityPair, TrianglePair};
 pub use scene::{
-    ClosestPoint, DetectionStats, IntersectionOptions, Intersections, Method, Penetration,
-    Proximity, Scene, SceneError, SceneOptions, UpdateStats,
+    ClosestPoint, ContactNodes, DetectionStats, IntersectionOptions, Intersections, Method,
+    Penetration, Proximity, ProximityOptions, Scene, SceneError, SceneOptions, UpdateStats,
 };

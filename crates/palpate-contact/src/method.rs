@@ -11,6 +11,7 @@ use std::fmt::Debug;
 use palpate_geometry::Aabb;
 use rayon::ThreadPool;
 
+use crate::proximity::Limit;
 use crate::scene::{Frame, IntersectionOptions, Intersections, Proximity, SceneBody};
 
 pub(crate) use paper::meeting_triangles;
@@ -46,8 +47,8 @@ impl Method {
     }
 }
 
-/// Distance \[m\] below which the elements of two bodies are a pair; `None` leaves the pair out.
-pub(crate) type DistanceOf<'a> = &'a (dyn Fn(usize, usize) -> Option<f64> + Sync);
+/// Which elements of two bodies are a pair; `None` leaves the bodies out.
+pub(crate) type LimitOf<'a> = &'a (dyn Fn(usize, usize) -> Option<Limit> + Sync);
 
 /// A method at work. It fills results that are handed over empty, and keeps its own buffers.
 pub(crate) trait Detector: Debug + Send + Sync {
@@ -77,5 +78,5 @@ pub(crate) trait Detector: Debug + Send + Sync {
         found: &mut Intersections,
     );
 
-    fn proximity(&mut self, frame: &Frame, distance: DistanceOf, found: &mut Proximity);
+    fn proximity(&mut self, frame: &Frame, limit_of: LimitOf, found: &mut Proximity);
 }

@@ -77,7 +77,7 @@ impl PenetrationSearch {
             &mut self.crossing_pairs,
             &mut found.stats,
             |pair, triangles, found, cost| {
-                found.extend(meeting_triangles(frame, pair, triangles, cost));
+                found.extend(meeting_triangles(frame, pair, triangles, false, cost));
             },
         );
 

@@ -2,19 +2,29 @@
 
 use palpate_geometry::{Point, edge_edge, point_triangle, vec3};
 
+use crate::left_out::CommonGroups;
 use crate::pairs::{PairKind, ProximityPair};
 use crate::scene::SceneBody;
 
 /// Distances below this fraction of the elements' size are too small to give a direction.
 const DIRECTION_THRESHOLD: f64 = 1e-12;
 
+/// Which pairs of features are wanted.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Limit {
+    /// Those closer than this [m].
+    pub(crate) distance: f64,
+    /// Also those that are as close where the meshes have them.
+    pub(crate) close_at_rest: bool,
+}
+
 /// Node `node` of body `body_a` against triangle `triangle` of body `body_b`; `None` when they share
-/// the node or are not closer than `distance`.
+/// the node or are otherwise not wanted.
 pub(crate) fn vertex_triangle(
     bodies: &[SceneBody],
     [body_a, body_b]: [u32; 2],
     [node, triangle]: [u32; 2],
-    distance: f64,
+    limit: Limit,
 ) -> Option<ProximityPair> {
     let (a, b) = (&bodies[body_a as usize], &bodies[body_b as usize]);
     let corners = b.mesh.triangles()[triangle as usize];
@@ -25,8 +35,16 @@ pub(crate) fn vertex_triangle(
     let points = b.triangle(triangle);
     let found = point_triangle(point, &points);
     let gap = found.distance_squared.sqrt();
-    if gap >= distance {
+    let common = |groups: CommonGroups| groups.of_node_and_triangle([node, triangle]);
+    if gap >= limit.distance || CommonGroups::of(a, b).is_some_and(common) {
         return None;
+    }
+    if !limit.close_at_rest {
+        let at_rest = corners.map(|node| b.mesh.nodes()[node as usize]);
+        let found = point_triangle(a.mesh.nodes()[node as usize], &at_rest);
+        if found.distance_squared.sqrt() < limit.distance {
+            return None;
+        }
     }
     let [wa, wb, wc] = found.weights;
     let weights = [1.0, -wa, -wb, -wc];
@@ -44,12 +62,12 @@ pub(crate) fn vertex_triangle(
     })
 }
 
-/// Two surface edges; `None` when they share a node or are not closer than `distance`.
+/// Two surface edges; `None` when they share a node or are otherwise not wanted.
 pub(crate) fn edge_pair(
     bodies: &[SceneBody],
     [body_a, body_b]: [u32; 2],
     [edge_a, edge_b]: [u32; 2],
-    distance: f64,
+    limit: Limit,
 ) -> Option<ProximityPair> {
     let (a, b) = (&bodies[body_a as usize], &bodies[body_b as usize]);
     let nodes_a = a.mesh.surface_edges()[edge_a as usize];
@@ -61,8 +79,16 @@ pub(crate) fn edge_pair(
     let points_b = nodes_b.map(|node| b.positions[node as usize]);
     let found = edge_edge(&points_a, &points_b);
     let gap = found.distance_squared.sqrt();
-    if gap >= distance {
+    let common = |groups: CommonGroups| groups.of_edges([edge_a, edge_b]);
+    if gap >= limit.distance || CommonGroups::of(a, b).is_some_and(common) {
         return None;
+    }
+    if !limit.close_at_rest {
+        let at_rest_a = nodes_a.map(|node| a.mesh.nodes()[node as usize]);
+        let at_rest_b = nodes_b.map(|node| b.mesh.nodes()[node as usize]);
+        if edge_edge(&at_rest_a, &at_rest_b).distance_squared.sqrt() < limit.distance {
+            return None;
+        }
     }
     let (s, t) = (found.s, found.t);
     let weights = [1.0 - s, s, t - 1.0, -t];

@@ -2,6 +2,7 @@
 
 mod error;
 mod lazy_tree;
+mod options;
 mod results;
 
 use std::sync::Arc;
@@ -12,9 +13,11 @@ use palpate_model::{Mesh, Structure};
 use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
-use crate::bounding_tree::{BoundingTree, Split, corner_points};
+use crate::bounding_tree::{BoundingTree, corner_points};
+use crate::left_out::{Groups, IgnoredPairs};
 use crate::method::Detector;
 use crate::penetration::PenetrationSearch;
+use crate::proximity::Limit;
 use crate::surface::Surface;
 use crate::upper_tree::UpperTree;
 
@@ -22,44 +25,10 @@ pub use crate::method::Method;
 use lazy_tree::LazyTree;
 
 pub use error::SceneError;
+pub use options::{IntersectionOptions, ProximityOptions, SceneOptions};
 pub use results::{
-    ClosestPoint, DetectionStats, Intersections, Penetration, Proximity, UpdateStats,
+    ClosestPoint, ContactNodes, DetectionStats, Intersections, Penetration, Proximity, UpdateStats,
 };
-
-/// How a scene is built and searched.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize, serde::Serialize)]
-pub struct SceneOptions {
-    /// Most tetrahedra in a leaf: the paper's K.
-    pub leaf_size: usize,
-    /// Where boxes are split.
-    pub split: Split,
-    /// How touching triangles are found.
-    pub method: Method,
-    /// Threads that detection may use; results are the same for any number.
-    pub threads: usize,
-}
-
-impl Default for SceneOptions {
-    fn default() -> Self {
-        Self { leaf_size: 10, split: Split::Middle, method: Method::Wide, threads: 1 }
-    }
-}
-
-/// What counts as an intersection.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct IntersectionOptions {
-    /// Also pairs of triangles of one body.
-    pub self_contact: bool,
-    /// Also pairs of triangles of one leaf, which the paper exempts. Methods without leaves always
-    /// test them.
-    pub same_leaf: bool,
-}
-
-impl Default for IntersectionOptions {
-    fn default() -> Self {
-        Self { self_contact: true, same_leaf: true }
-    }
-}
 
 /// One body: its mesh and what follows from it, and where its nodes are now.
 #[derive(Debug)]
@@ -68,6 +37,8 @@ pub(crate) struct SceneBody {
     pub(crate) positions: Vec<Point>,
     tree: LazyTree,
     pub(crate) surface: Surface,
+    /// `None` where no triangle has a group.
+    pub(crate) groups: Option<Groups>,
 }
 
 impl SceneBody {
@@ -75,7 +46,7 @@ impl SceneBody {
         let tree = BoundingTree::new(&mesh, options.leaf_size, options.split);
         let surface = Surface::new(&mesh, tree.triangle_order());
         let positions = mesh.nodes().to_vec();
-        Self { mesh, positions, tree: LazyTree::new(tree), surface }
+        Self { mesh, positions, tree: LazyTree::new(tree), surface, groups: None }
     }
 
     /// The bounding tree, refitted to the positions.
@@ -94,22 +65,42 @@ impl SceneBody {
 pub(crate) struct Frame<'a> {
     pub(crate) bodies: &'a [SceneBody],
     pub(crate) upper: &'a UpperTree,
+    pub(crate) ignored: &'a IgnoredPairs,
     pub(crate) pool: Option<&'a ThreadPool>,
 }
 
 impl Frame<'_> {
+    /// Whether a body pair, in any order, is not to be tested.
+    pub(crate) fn is_ignored(&self, a: u32, b: u32) -> bool {
+        self.ignored.holds(a, b)
+    }
+
+    /// Collects the body pairs (a <= b) whose triangles can meet; returns the upper tree's nodes visited.
+    pub(crate) fn object_pairs(&self, self_contact: bool, found: &mut Vec<(u32, u32)>) -> u64 {
+        found.clear();
+        let visited = self.upper.pairs(found);
+        if self_contact {
+            found.extend((0..self.bodies.len() as u32).map(|body| (body, body)));
+        }
+        found.retain(|&(a, b)| !self.is_ignored(a, b));
+        visited
+    }
+
     /// Pairs of triangles that the double loop would test.
     pub(crate) fn all_pairs(&self, self_contact: bool) -> u64 {
-        let counts = self.bodies.iter().map(|body| body.mesh.triangles().len() as u64);
+        let count = |body: u32| self.bodies[body as usize].mesh.triangles().len() as u64;
+        let of_one =
+            |count: u64| if self_contact { count * count.saturating_sub(1) / 2 } else { 0 };
         let (mut pairs, mut before) = (0, 0);
-        for count in counts {
-            pairs += before * count;
+        for count in (0..self.bodies.len() as u32).map(count) {
+            pairs += before * count + of_one(count);
             before += count;
-            if self_contact {
-                pairs += count * count.saturating_sub(1) / 2;
-            }
         }
-        pairs
+        let ignored = self.ignored.pairs().iter();
+        let left_out = |&[a, b]: &[u32; 2]| {
+            if a == b { of_one(count(a)) } else { count(a) * count(b) }
+        };
+        pairs - ignored.map(left_out).sum::<u64>()
     }
 }
 
@@ -121,6 +112,7 @@ impl Frame<'_> {
 pub struct Scene {
     bodies: Vec<SceneBody>,
     upper: UpperTree,
+    ignored: IgnoredPairs,
     options: SceneOptions,
     pool: Option<ThreadPool>,
     detector: Box<dyn Detector>,
@@ -128,6 +120,7 @@ pub struct Scene {
     intersections: Intersections,
     proximity: Proximity,
     penetration: Penetration,
+    contact_nodes: ContactNodes,
 }
 
 impl Scene {
@@ -161,6 +154,7 @@ impl Scene {
         let mut scene = Self {
             bodies,
             upper,
+            ignored: IgnoredPairs::default(),
             options,
             pool,
             detector: options.method.detector(),
@@ -168,6 +162,7 @@ impl Scene {
             intersections: Intersections::default(),
             proximity: Proximity::default(),
             penetration: Penetration::default(),
+            contact_nodes: ContactNodes::default(),
         };
         scene.bodies_changed();
         Ok(scene)
@@ -190,11 +185,13 @@ impl Scene {
         self.check_body(body)?;
         let removed = self.bodies.remove(body);
         self.upper.remove(body);
+        self.ignored.remove_body(body as u32);
         self.bodies_changed();
         Ok(removed.mesh)
     }
 
-    /// Gives a body another mesh, at that mesh's positions, and returns the former one.
+    /// Gives a body another mesh, at that mesh's positions, and returns the former one. Its pairs with
+    /// other bodies stay ignored, its triangles are without groups.
     ///
     /// # Errors
     /// If there is no such body.
@@ -204,6 +201,40 @@ impl Scene {
         let former = std::mem::replace(&mut self.bodies[body], new);
         self.bodies_changed();
         Ok(former.mesh)
+    }
+
+    /// Leaves two bodies, in any order, out of every search, or takes them in again; the same body twice
+    /// is its self-contact.
+    ///
+    /// # Errors
+    /// If there is no such body.
+    pub fn ignore(&mut self, a: usize, b: usize, ignored: bool) -> Result<(), SceneError> {
+        self.check_body(a)?;
+        self.check_body(b)?;
+        self.ignored.set(a as u32, b as u32, ignored);
+        Ok(())
+    }
+
+    /// Whether two bodies, in any order, are left out.
+    pub fn is_ignored(&self, a: usize, b: usize) -> bool {
+        self.ignored.holds(a as u32, b as u32)
+    }
+
+    /// Puts the surface triangles of a body into groups, 0 being none: elements of a common group,
+    /// whatever their bodies, are no pair in [`Self::intersections`], [`Self::contact_nodes`] and
+    /// [`Self::proximity`]. A node or edge is in the groups of all triangles around it.
+    ///
+    /// # Errors
+    /// If there is no such body, or there is not one group for each of its surface triangles.
+    pub fn set_groups(&mut self, body: usize, groups: &[u32]) -> Result<(), SceneError> {
+        self.check_body(body)?;
+        let of_body = &mut self.bodies[body];
+        let (given, expected) = (groups.len(), of_body.mesh.triangles().len());
+        if given != expected {
+            return Err(SceneError::GroupCount { body, given, expected });
+        }
+        of_body.groups = Groups::new(&of_body.mesh, groups);
+        Ok(())
     }
 
     /// Number of bodies.
@@ -277,13 +308,25 @@ impl Scene {
     }
 
     /// All pairs of surface triangles that meet (closed: touching counts), decided exactly. Triangles
-    /// of one body that share a node are left out.
+    /// of one body that share a node are left out, unless `options` say otherwise.
     pub fn intersections(&mut self, options: &IntersectionOptions) -> &Intersections {
-        let frame = Frame { bodies: &self.bodies, upper: &self.upper, pool: self.pool.as_ref() };
+        let frame = Frame {
+            bodies: &self.bodies,
+            upper: &self.upper,
+            ignored: &self.ignored,
+            pool: self.pool.as_ref(),
+        };
         self.intersections.pairs.clear();
         self.intersections.stats = DetectionStats::default();
         self.detector.intersections(&frame, *options, &mut self.intersections);
         &self.intersections
+    }
+
+    /// The nodes of all triangles that [`Self::intersections`] finds: the paper's own output.
+    pub fn contact_nodes(&mut self, options: &IntersectionOptions) -> &ContactNodes {
+        self.intersections(options);
+        self.contact_nodes.collect(&self.bodies, &self.intersections);
+        &self.contact_nodes
     }
 
     /// All vertex-triangle and edge-edge pairs that share no node and are closer than the distance of
@@ -295,10 +338,29 @@ impl Scene {
         &mut self,
         distance: &(dyn Fn(usize, usize) -> Option<f64> + Sync),
     ) -> &Proximity {
-        let frame = Frame { bodies: &self.bodies, upper: &self.upper, pool: self.pool.as_ref() };
+        self.proximity_with(distance, &ProximityOptions::default())
+    }
+
+    /// [`Self::proximity`] with a choice of what counts.
+    pub fn proximity_with(
+        &mut self,
+        distance: &(dyn Fn(usize, usize) -> Option<f64> + Sync),
+        options: &ProximityOptions,
+    ) -> &Proximity {
+        let frame = Frame {
+            bodies: &self.bodies,
+            upper: &self.upper,
+            ignored: &self.ignored,
+            pool: self.pool.as_ref(),
+        };
         self.proximity.pairs.clear();
         self.proximity.stats = DetectionStats::default();
-        self.detector.proximity(&frame, distance, &mut self.proximity);
+        let limit_of = |a: usize, b: usize| {
+            let distance = if frame.is_ignored(a as u32, b as u32) { None } else { distance(a, b) };
+            let distance = distance.filter(|&distance| distance > 0.0)?;
+            Some(Limit { distance, close_at_rest: options.close_at_rest })
+        };
+        self.detector.proximity(&frame, &limit_of, &mut self.proximity);
         &self.proximity
     }
 
@@ -310,7 +372,12 @@ impl Scene {
     ///
     /// Known limits: a node deeper than half the body's thickness leaves on the far side.
     pub fn penetration(&mut self, include: &(dyn Fn(usize, usize) -> bool + Sync)) -> &Penetration {
-        let frame = Frame { bodies: &self.bodies, upper: &self.upper, pool: self.pool.as_ref() };
+        let frame = Frame {
+            bodies: &self.bodies,
+            upper: &self.upper,
+            ignored: &self.ignored,
+            pool: self.pool.as_ref(),
+        };
         self.penetration.nodes.clear();
         self.penetration.stats = DetectionStats::default();
         self.penetration_search.run(&frame, include, &mut self.penetration);

@@ -7,7 +7,7 @@ mod scenes;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use palpate_contact::{IntersectionOptions, Method, Scene, SceneOptions};
+use palpate_contact::{IntersectionOptions, Method, ProximityOptions, Scene, SceneOptions};
 
 use scenes::{Random, as_slices, deforming, horseshoe, jittered, soup};
 
@@ -52,7 +52,13 @@ fn a_frame_allocates_nothing() {
     for method in Method::ALL {
         let options = SceneOptions { method, ..SceneOptions::default() };
         let mut scene = Scene::new(case.meshes.clone(), None, options).expect("three meshes");
-        let mut found = [0; 3];
+        let groups: Vec<u32> =
+            (0..case.meshes[2].triangles().len() as u32).map(|i| i % 5).collect();
+        scene.set_groups(2, &groups).expect("one for each triangle");
+        scene.ignore(1, 1, true).expect("there are three");
+        let shared = IntersectionOptions { shared_nodes: true, ..IntersectionOptions::default() };
+        let at_rest = ProximityOptions { close_at_rest: false };
+        let mut found = [0; 6];
         let mut round = |scene: &mut Scene| {
             for frame in &frames {
                 scene.update(frame).expect("finite positions");
@@ -60,6 +66,9 @@ fn a_frame_allocates_nothing() {
                 found[1] += scene.proximity(&|_, _| Some(0.1)).pairs.len();
                 found[2] += scene.penetration(&|_, _| true).nodes.len();
                 scene.closest_point(0, [0.0; 3], 1.0);
+                found[3] += scene.intersections(&shared).pairs.len();
+                found[4] += scene.proximity_with(&|_, _| Some(0.1), &at_rest).pairs.len();
+                found[5] += scene.contact_nodes(&shared).nodes[2].len();
             }
         };
         round(&mut scene);

@@ -76,8 +76,10 @@ fn very_many_small_scenes_have_the_pairs_of_the_double_loop() {
             let positions = place(&meshes, &mut random);
             wide.update(&as_slices(&positions)).expect("finite positions");
             slow.update(&as_slices(&positions)).expect("finite positions");
-            let expected = &slow.intersections(&IntersectionOptions::default()).pairs;
-            let found = &wide.intersections(&IntersectionOptions::default()).pairs;
+            let options =
+                IntersectionOptions { shared_nodes: frame % 2 == 0, ..Default::default() };
+            let expected = &slow.intersections(&options).pairs;
+            let found = &wide.intersections(&options).pairs;
             assert_eq!(found, expected, "{positions:?}");
             meeting += expected.len();
             if frame % 5 == 0 {
@@ -110,7 +112,8 @@ fn results_are_the_same_at_any_number_of_threads() {
             let options = SceneOptions { method: Method::Wide, threads, ..Default::default() };
             let mut scene = Scene::new(case.meshes.clone(), None, options).expect("meshes");
             scene.update(&as_slices(frame)).expect("finite positions");
-            let meeting = scene.intersections(&IntersectionOptions::default());
+            let shared = IntersectionOptions { shared_nodes: true, ..Default::default() };
+            let meeting = scene.intersections(&shared);
             let (pairs, tests) = (meeting.pairs.clone(), meeting.stats.polygon_tests);
             let close = scene.proximity(&|_, _| Some(0.05));
             let found = (pairs, tests, close.pairs.clone(), close.stats.polygon_tests);

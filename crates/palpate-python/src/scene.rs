@@ -5,20 +5,20 @@ mod queries;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use numpy::{PyArray2, PyReadonlyArray2};
-use palpate::contact::{IntersectionOptions, Method, Split};
+use numpy::{PyArray2, PyReadonlyArray1, PyReadonlyArray2};
+use palpate::contact::{IntersectionOptions, Method, ProximityOptions, Split};
 use palpate::geometry::Point;
 use palpate::{Scene, SceneOptions};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyDict, PyTuple};
 
 use crate::arrays::{matrix, points};
 use crate::errors::raise;
 use crate::mesh::PyMesh;
 use crate::model::structure_from_python;
 
-use queries::IntersectionColumns;
+use queries::{IntersectionColumns, ProximityColumns};
 pub(crate) use queries::{StatsRow, intersection_rows};
 
 /// Bodies and their bounding trees. The lock lets two Python threads use one scene in turn.
@@ -93,8 +93,51 @@ impl PyScene {
         py: Python<'py>,
         self_contact: bool,
         same_leaf: bool,
+        shared_nodes: bool,
     ) -> PyResult<IntersectionColumns<'py>> {
-        self.find_intersections(py, IntersectionOptions { self_contact, same_leaf })
+        let options = IntersectionOptions { self_contact, same_leaf, shared_nodes };
+        self.find_intersections(py, options)
+    }
+
+    fn proximity<'py>(
+        &self,
+        py: Python<'py>,
+        distance: f64,
+        self_contact: bool,
+        close_at_rest: bool,
+    ) -> PyResult<ProximityColumns<'py>> {
+        self.find_proximity(py, distance, self_contact, &ProximityOptions { close_at_rest })
+    }
+
+    fn contact_nodes<'py>(
+        &self,
+        py: Python<'py>,
+        self_contact: bool,
+    ) -> PyResult<Bound<'py, PyTuple>> {
+        let options = IntersectionOptions { self_contact, ..IntersectionOptions::default() };
+        self.find_contact_nodes(py, &options)
+    }
+
+    fn ignore(&self, py: Python<'_>, body_a: usize, body_b: usize, ignored: bool) -> PyResult<()> {
+        raise(py, self.lock().0.ignore(body_a, body_b, ignored))
+    }
+
+    fn set_groups(
+        &self,
+        py: Python<'_>,
+        body: usize,
+        groups: PyReadonlyArray1<'_, i64>,
+    ) -> PyResult<()> {
+        let group = |(triangle, group): (usize, &i64)| {
+            u32::try_from(*group).map_err(|_| {
+                let most = u32::MAX;
+                let text = format!("groups[{triangle}]: got {group}, expected 0 to {most}");
+                PyValueError::new_err(text)
+            })
+        };
+        let groups: Vec<u32> =
+            groups.as_array().iter().enumerate().map(group).collect::<PyResult<_>>()?;
+        raise(py, self.lock().0.set_groups(body, &groups))
     }
 
     fn tree_stats<'py>(&self, py: Python<'py>, body: usize) -> PyResult<Bound<'py, PyDict>> {

@@ -202,7 +202,7 @@ impl PySimulation {
         py: Python<'py>,
         self_contact: bool,
     ) -> PyResult<(Bound<'py, PyArray2<i32>>, StatsRow)> {
-        let options = IntersectionOptions { self_contact, same_leaf: true };
+        let options = IntersectionOptions { self_contact, ..IntersectionOptions::default() };
         let found = py.detach(|| {
             let mut guard = self.lock();
             let scene = guard.scene()?;

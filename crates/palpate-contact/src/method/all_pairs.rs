@@ -4,8 +4,10 @@ use std::time::Instant;
 
 use palpate_geometry::triangles_intersect;
 
-use super::{Detector, DistanceOf};
+use super::{Detector, LimitOf};
 use crate::leaf_pairs::share_a_node;
+use crate::left_out::CommonGroups;
+use crate::neighbours::neighbours_meet;
 use crate::pairs::TrianglePair;
 use crate::proximity::{edge_pair, sort, vertex_triangle};
 use crate::scene::{Frame, IntersectionOptions, Intersections, Proximity};
@@ -26,9 +28,11 @@ impl Detector for AllPairs {
         for (body_a, a) in frame.bodies.iter().enumerate() {
             for (body_b, b) in frame.bodies.iter().enumerate().skip(body_a) {
                 let same = body_a == body_b;
-                if same && !options.self_contact {
+                let wanted = options.self_contact || !same;
+                if !wanted || frame.is_ignored(body_a as u32, body_b as u32) {
                     continue;
                 }
+                let groups = CommonGroups::of(a, b);
                 found.stats.object_pairs += 1;
                 for (triangle_a, &corners_a) in a.mesh.triangles().iter().enumerate() {
                     let points_a = a.triangle(triangle_a as u32);
@@ -36,11 +40,20 @@ impl Detector for AllPairs {
                     for (triangle_b, &corners_b) in
                         b.mesh.triangles().iter().enumerate().skip(first)
                     {
-                        if same && share_a_node(corners_a, corners_b) {
+                        let triangles = [triangle_a as u32, triangle_b as u32];
+                        let neighbours = same && share_a_node(corners_a, corners_b);
+                        if neighbours && !options.shared_nodes
+                            || groups.is_some_and(|groups| groups.of_triangles(triangles))
+                        {
                             continue;
                         }
                         found.stats.polygon_tests += 1;
-                        if triangles_intersect(&points_a, &b.triangle(triangle_b as u32)) {
+                        let meet = if neighbours {
+                            neighbours_meet(a, triangles)
+                        } else {
+                            triangles_intersect(&points_a, &b.triangle(triangle_b as u32))
+                        };
+                        if meet {
                             found.pairs.push(TrianglePair {
                                 body_a: body_a as u32,
                                 triangle_a: triangle_a as u32,
@@ -56,14 +69,13 @@ impl Detector for AllPairs {
         found.stats.polygon_time = start.elapsed();
     }
 
-    fn proximity(&mut self, frame: &Frame, distance: DistanceOf, found: &mut Proximity) {
+    fn proximity(&mut self, frame: &Frame, limit_of: LimitOf, found: &mut Proximity) {
         let start = Instant::now();
         found.stats.all_pairs = frame.all_pairs(true);
         let bodies = frame.bodies;
         for (body_a, a) in bodies.iter().enumerate() {
             for (body_b, b) in bodies.iter().enumerate().skip(body_a) {
-                let Some(distance) = distance(body_a, body_b).filter(|&distance| distance > 0.0)
-                else {
+                let Some(limit) = limit_of(body_a, body_b) else {
                     continue;
                 };
                 found.stats.object_pairs += 1;
@@ -71,7 +83,7 @@ impl Detector for AllPairs {
                     for &node in bodies[from].mesh.surface_nodes() {
                         for triangle in 0..bodies[to].mesh.triangles().len() as u32 {
                             let pair = [from as u32, to as u32];
-                            let record = vertex_triangle(bodies, pair, [node, triangle], distance);
+                            let record = vertex_triangle(bodies, pair, [node, triangle], limit);
                             found.pairs.extend(record);
                             found.stats.polygon_tests += 1;
                         }
@@ -85,7 +97,7 @@ impl Detector for AllPairs {
                     let first = if body_a == body_b { edge_a + 1 } else { 0 };
                     for edge_b in first..b.mesh.surface_edges().len() as u32 {
                         let pair = [body_a as u32, body_b as u32];
-                        found.pairs.extend(edge_pair(bodies, pair, [edge_a, edge_b], distance));
+                        found.pairs.extend(edge_pair(bodies, pair, [edge_a, edge_b], limit));
                         found.stats.polygon_tests += 1;
                     }
                 }

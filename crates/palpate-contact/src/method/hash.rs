@@ -6,8 +6,10 @@ use std::time::Instant;
 use palpate_geometry::{Aabb, triangles_intersect, vec3};
 
 use super::paper::Paper;
-use super::{Detector, DistanceOf};
+use super::{Detector, LimitOf};
 use crate::leaf_pairs::share_a_node;
+use crate::left_out::CommonGroups;
+use crate::neighbours::neighbours_meet;
 use crate::pairs::TrianglePair;
 use crate::scene::{Frame, IntersectionOptions, Intersections, Proximity, SceneBody};
 
@@ -92,14 +94,19 @@ impl Detector for Hash {
         let testing = Instant::now();
         for pair in &self.candidates {
             let pair = pair.map(|index| self.triangles[index as usize]);
-            found.pairs.extend(meeting(frame, pair, &mut stats.polygon_tests));
+            found.pairs.extend(meeting(
+                frame,
+                pair,
+                options.shared_nodes,
+                &mut stats.polygon_tests,
+            ));
         }
         found.pairs.sort_unstable();
         stats.polygon_time = testing.elapsed();
     }
 
-    fn proximity(&mut self, frame: &Frame, distance: DistanceOf, found: &mut Proximity) {
-        self.tree.proximity(frame, distance, found);
+    fn proximity(&mut self, frame: &Frame, limit_of: LimitOf, found: &mut Proximity) {
+        self.tree.proximity(frame, limit_of, found);
     }
 }
 
@@ -204,18 +211,36 @@ impl Hash {
     }
 }
 
-/// The exact test of two triangles, the first before the second.
-fn meeting(frame: &Frame, [a, b]: [Triangle; 2], polygon_tests: &mut u64) -> Option<TrianglePair> {
+/// The exact test of two triangles, the first before the second, if they are wanted.
+fn meeting(
+    frame: &Frame,
+    [a, b]: [Triangle; 2],
+    shared_nodes: bool,
+    polygon_tests: &mut u64,
+) -> Option<TrianglePair> {
     let (body_a, body_b) = (&frame.bodies[a.body as usize], &frame.bodies[b.body as usize]);
     let corners_a = body_a.mesh.triangles()[a.index as usize];
     let corners_b = body_b.mesh.triangles()[b.index as usize];
-    if a.body == b.body && share_a_node(corners_a, corners_b) {
+    let neighbours = a.body == b.body && share_a_node(corners_a, corners_b);
+    let triangles = [a.index, b.index];
+    if neighbours && !shared_nodes
+        || frame.is_ignored(a.body, b.body)
+        || CommonGroups::of(body_a, body_b).is_some_and(|groups| groups.of_triangles(triangles))
+    {
         return None;
     }
     *polygon_tests += 1;
-    triangles_intersect(&body_a.triangle(a.index), &body_b.triangle(b.index)).then_some(
-        TrianglePair { body_a: a.body, triangle_a: a.index, body_b: b.body, triangle_b: b.index },
-    )
+    let meet = if neighbours {
+        neighbours_meet(body_a, triangles)
+    } else {
+        triangles_intersect(&body_a.triangle(a.index), &body_b.triangle(b.index))
+    };
+    meet.then_some(TrianglePair {
+        body_a: a.body,
+        triangle_a: a.index,
+        body_b: b.body,
+        triangle_b: b.index,
+    })
 }
 
 /// Cells of one size over the scene.

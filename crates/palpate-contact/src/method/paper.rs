@@ -4,9 +4,11 @@ use std::time::Instant;
 
 use palpate_geometry::{Aabb, triangles_intersect};
 
-use super::{Detector, DistanceOf};
+use super::{Detector, LimitOf};
 use crate::bounding_tree::corner_points;
 use crate::leaf_pairs::{BodyPair, Cost, LeafPairSearch, meets, share_a_node, widened};
+use crate::left_out::CommonGroups;
+use crate::neighbours::neighbours_meet;
 use crate::pairs::{ProximityPair, TrianglePair};
 use crate::proximity::{edge_pair, sort, vertex_triangle};
 use crate::scene::{Frame, IntersectionOptions, Intersections, Proximity, SceneBody};
@@ -29,15 +31,10 @@ impl Detector for Paper {
         let start = Instant::now();
         let stats = &mut found.stats;
         stats.all_pairs = frame.all_pairs(options.self_contact);
-        self.objects.clear();
-        stats.nodes_visited += frame.upper.pairs(&mut self.objects);
+        stats.nodes_visited += frame.object_pairs(options.self_contact, &mut self.objects);
         let body_pairs = &mut self.meeting.body_pairs;
         body_pairs.clear();
         body_pairs.extend(self.objects.iter().map(|&(a, b)| BodyPair::meeting(a, b)));
-        if options.self_contact {
-            let bodies = 0..frame.bodies.len() as u32;
-            body_pairs.extend(bodies.map(|body| BodyPair::meeting(body, body)));
-        }
         stats.object_time = start.elapsed();
         self.meeting.run(
             frame,
@@ -45,7 +42,10 @@ impl Detector for Paper {
             &mut found.pairs,
             stats,
             |pair, triangles, found, cost| {
-                found.extend(meeting_triangles(frame, pair, triangles, cost));
+                if !in_common_group(frame, pair, triangles) {
+                    let shared_nodes = options.shared_nodes;
+                    found.extend(meeting_triangles(frame, pair, triangles, shared_nodes, cost));
+                }
             },
         );
         let sorting = Instant::now();
@@ -53,7 +53,7 @@ impl Detector for Paper {
         found.stats.polygon_time += sorting.elapsed();
     }
 
-    fn proximity(&mut self, frame: &Frame, distance: DistanceOf, found: &mut Proximity) {
+    fn proximity(&mut self, frame: &Frame, limit_of: LimitOf, found: &mut Proximity) {
         let start = Instant::now();
         let stats = &mut found.stats;
         stats.all_pairs = frame.all_pairs(true);
@@ -62,10 +62,10 @@ impl Detector for Paper {
         body_pairs.clear();
         for (a, body_a) in frame.bodies.iter().enumerate() {
             for (b, body_b) in frame.bodies.iter().enumerate().skip(a) {
-                let Some(distance) = distance(a, b).filter(|&distance| distance > 0.0) else {
+                let Some(limit) = limit_of(a, b) else {
                     continue;
                 };
-                let pair = BodyPair::within(a as u32, b as u32, distance, &scene_bounds);
+                let pair = BodyPair::within(a as u32, b as u32, limit, &scene_bounds);
                 if widened(&body_a.tree().bounds(), pair.margin).intersects(&body_b.tree().bounds())
                 {
                     body_pairs.push(pair);
@@ -82,29 +82,47 @@ impl Detector for Paper {
     }
 }
 
-/// The exact test of two triangles, given by their positions in the trees.
+/// Whether two triangles, given by their positions in the trees, have a group in common.
+#[inline]
+fn in_common_group(frame: &Frame, pair: &BodyPair, [i, j]: [u32; 2]) -> bool {
+    let (a, b) = (&frame.bodies[pair.a as usize], &frame.bodies[pair.b as usize]);
+    CommonGroups::of(a, b).is_some_and(|groups| {
+        let (order_a, order_b) = (a.tree().triangle_order(), b.tree().triangle_order());
+        groups.of_triangles([order_a[i as usize], order_b[j as usize]])
+    })
+}
+
+/// The exact test of two triangles, given by their positions in the trees; of triangles that share
+/// nodes with `shared_nodes`.
 pub(crate) fn meeting_triangles(
     frame: &Frame,
     pair: &BodyPair,
     [i, j]: [u32; 2],
+    shared_nodes: bool,
     cost: &mut Cost,
 ) -> Option<TrianglePair> {
     let (a, b) = (&frame.bodies[pair.a as usize], &frame.bodies[pair.b as usize]);
     let (corners_a, corners_b) = (a.tree().corners(i), b.tree().corners(j));
-    if pair.is_self() && share_a_node(corners_a, corners_b) {
+    let neighbours = pair.is_self() && share_a_node(corners_a, corners_b);
+    if neighbours && !shared_nodes {
         return None;
     }
     cost.polygon_tests += 1;
-    let points_a = corner_points(&a.positions, corners_a);
-    let points_b = corner_points(&b.positions, corners_b);
-    if !triangles_intersect(&points_a, &points_b) {
+    let mut triangles =
+        [a.tree().triangle_order()[i as usize], b.tree().triangle_order()[j as usize]];
+    let meet = if neighbours {
+        neighbours_meet(a, triangles)
+    } else {
+        let points_a = corner_points(&a.positions, corners_a);
+        triangles_intersect(&points_a, &corner_points(&b.positions, corners_b))
+    };
+    if !meet {
         return None;
     }
-    let mut triangle_a = a.tree().triangle_order()[i as usize];
-    let mut triangle_b = b.tree().triangle_order()[j as usize];
-    if pair.is_self() && triangle_b < triangle_a {
-        std::mem::swap(&mut triangle_a, &mut triangle_b);
+    if pair.is_self() {
+        triangles.sort_unstable();
     }
+    let [triangle_a, triangle_b] = triangles;
     Some(TrianglePair { body_a: pair.a, triangle_a, body_b: pair.b, triangle_b })
 }
 
@@ -192,7 +210,7 @@ fn close_features(
             }
             cost.polygon_tests += 1;
             let elements = [node, to.triangle()];
-            found.extend(vertex_triangle(bodies, [from.body, to.body], elements, pair.distance));
+            found.extend(vertex_triangle(bodies, [from.body, to.body], elements, pair.limit));
         }
     }
     if a.owned >> 3 == 0 || b.owned >> 3 == 0 {
@@ -217,7 +235,7 @@ fn close_features(
             if pair.is_self() {
                 edges.sort_unstable();
             }
-            found.extend(edge_pair(bodies, [pair.a, pair.b], edges, pair.distance));
+            found.extend(edge_pair(bodies, [pair.a, pair.b], edges, pair.limit));
         }
     }
 }

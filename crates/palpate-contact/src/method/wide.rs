@@ -7,8 +7,10 @@ use palpate_geometry::{Aabb, Point, triangles_intersect};
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
-use super::{Detector, DistanceOf};
+use super::{Detector, LimitOf};
 use crate::leaf_pairs::{BodyPair, Cost, for_each};
+use crate::left_out::CommonGroups;
+use crate::neighbours::neighbours_meet;
 use crate::pairs::{ProximityPair, TrianglePair};
 use crate::proximity::{edge_pair, sort, vertex_triangle};
 use crate::scene::{
@@ -52,6 +54,8 @@ struct ElementSearch {
 #[derive(Clone, Copy, Debug)]
 enum Elements {
     Triangles,
+    /// Triangles of one body that share nodes.
+    Neighbours,
     Edges,
     /// Nodes of a and triangles of b.
     NodesOfA,
@@ -71,7 +75,9 @@ impl ElementSearch {
     fn sides<'a>(&self, bodies: &'a [WideBody]) -> Sides<'a> {
         let [a, b] = self.bodies().map(|body| &bodies[body as usize]);
         match self.elements {
-            Elements::Triangles => a.triangles_and_triangles(b, self.pair.margin),
+            Elements::Triangles | Elements::Neighbours => {
+                a.triangles_and_triangles(b, self.pair.margin)
+            }
             Elements::Edges => a.edges_and_edges(b, self.pair.margin),
             _ => a.points_and_triangles(b, self.pair.margin),
         }
@@ -160,8 +166,9 @@ impl Wide {
         let chunk = |size| if threads { size } else { usize::MAX };
         for (index, search) in self.searches.iter().enumerate() {
             let sides = search.sides(&self.bodies);
+            let neighbours = matches!(search.elements, Elements::Neighbours);
             let search = index as u32;
-            if let Some(mut level) = sides.top() {
+            if !neighbours && let Some(mut level) = sides.top() {
                 let traversal = &mut self.splitting;
                 traversal.pairs.clear();
                 traversal.pairs.push([0, 0]);
@@ -239,19 +246,16 @@ impl Detector for Wide {
         let start = Instant::now();
         let stats = &mut found.stats;
         stats.all_pairs = frame.all_pairs(options.self_contact);
-        self.objects.clear();
-        stats.nodes_visited += frame.upper.pairs(&mut self.objects);
-        let triangles = |a: u32, b: u32| ElementSearch {
-            pair: BodyPair::meeting(a, b),
-            elements: Elements::Triangles,
-        };
+        stats.nodes_visited += frame.object_pairs(options.self_contact, &mut self.objects);
+        stats.object_pairs += self.objects.len() as u64;
         self.searches.clear();
-        self.searches.extend(self.objects.iter().map(|&(a, b)| triangles(a, b)));
-        if options.self_contact {
-            let bodies = 0..frame.bodies.len() as u32;
-            self.searches.extend(bodies.map(|body| triangles(body, body)));
+        for &(a, b) in &self.objects {
+            let pair = BodyPair::meeting(a, b);
+            self.searches.push(ElementSearch { pair, elements: Elements::Triangles });
+            if options.shared_nodes && a == b {
+                self.searches.push(ElementSearch { pair, elements: Elements::Neighbours });
+            }
         }
-        stats.object_pairs += self.searches.len() as u64;
         stats.object_time = start.elapsed();
         let start = Instant::now();
         let mut cost = Cost::default();
@@ -265,7 +269,7 @@ impl Detector for Wide {
         stats.polygon_time += sorting.elapsed();
     }
 
-    fn proximity(&mut self, frame: &Frame, distance: DistanceOf, found: &mut Proximity) {
+    fn proximity(&mut self, frame: &Frame, limit_of: LimitOf, found: &mut Proximity) {
         let start = Instant::now();
         let stats = &mut found.stats;
         stats.all_pairs = frame.all_pairs(true);
@@ -273,8 +277,8 @@ impl Detector for Wide {
         self.searches.clear();
         for a in 0..frame.bodies.len() {
             for b in a..frame.bodies.len() {
-                if let Some(distance) = distance(a, b).filter(|&distance| distance > 0.0) {
-                    let pair = BodyPair::within(a as u32, b as u32, distance, &scene_bounds);
+                if let Some(limit) = limit_of(a, b) {
+                    let pair = BodyPair::within(a as u32, b as u32, limit, &scene_bounds);
                     stats.object_pairs += 1;
                     for elements in [Elements::Edges, Elements::NodesOfA, Elements::NodesOfB] {
                         if a != b || !matches!(elements, Elements::NodesOfB) {
@@ -357,7 +361,8 @@ impl Search<'_> {
         groups.clear();
         *cost = Cost::default();
         for &task in &self.tasks[tasks[0]..tasks[1]] {
-            let sides = self.searches[task.search as usize].sides(self.bodies);
+            let search = &self.searches[task.search as usize];
+            let sides = search.sides(self.bodies);
             match task.part {
                 Part::Blocks { level, seeds } => {
                     traversal.pairs.clear();
@@ -368,8 +373,9 @@ impl Search<'_> {
                     traversal.collect(self.isa, &sides, candidates, cost);
                 }
                 Part::Adjacent([start, end]) => {
+                    let sharing = matches!(search.elements, Elements::Neighbours);
                     let range = start..end;
-                    traversal.collect_adjacent(self.isa, &sides, range, candidates, cost);
+                    traversal.collect_adjacent(self.isa, &sides, sharing, range, candidates, cost);
                 }
             }
             groups.push(Group { task, end: candidates.len() });
@@ -382,21 +388,38 @@ impl Search<'_> {
         found.clear();
         let mut start = 0;
         for group in groups.iter() {
-            let pair = &self.searches[group.task.search as usize].pair;
+            let search = &self.searches[group.task.search as usize];
+            let pair = &search.pair;
             let (a, b) = (&self.bodies[pair.a as usize], &self.bodies[pair.b as usize]);
             let reach = Reach::new(a, b, 0.0);
             kept.clear();
             let candidates = &candidates[start..group.end];
-            self.isa.run(SeparateTriangles { a, b, reach, candidates, kept });
             start = group.end;
-            cost.polygon_tests += kept.len() as u64;
+            let neighbours = matches!(search.elements, Elements::Neighbours);
+            if neighbours {
+                kept.extend_from_slice(candidates);
+            } else {
+                self.isa.run(SeparateTriangles { a, b, reach, candidates, kept });
+            }
             let (body_a, body_b) =
                 (&self.frame.bodies[pair.a as usize], &self.frame.bodies[pair.b as usize]);
+            if let Some(groups) = CommonGroups::of(body_a, body_b) {
+                kept.retain(|&[slot_a, slot_b]| {
+                    let triangles = [a.triangles.element(slot_a), b.triangles.element(slot_b)];
+                    !groups.of_triangles(triangles)
+                });
+            }
+            cost.polygon_tests += kept.len() as u64;
             for &[slot_a, slot_b] in kept.iter() {
                 let (mut triangle_a, mut triangle_b) =
                     (a.triangles.element(slot_a), b.triangles.element(slot_b));
-                let points = (body_a.triangle(triangle_a), body_b.triangle(triangle_b));
-                if triangles_intersect(&points.0, &points.1) {
+                let meet = if neighbours {
+                    neighbours_meet(body_a, [triangle_a, triangle_b])
+                } else {
+                    let points = (body_a.triangle(triangle_a), body_b.triangle(triangle_b));
+                    triangles_intersect(&points.0, &points.1)
+                };
+                if meet {
                     if pair.is_self() && triangle_b < triangle_a {
                         std::mem::swap(&mut triangle_a, &mut triangle_b);
                     }
@@ -428,13 +451,13 @@ impl Search<'_> {
                     let (edge_a, edge_b) = (a.edges.element(slot_a), b.edges.element(slot_b));
                     let swapped = pair.is_self() && edge_b < edge_a;
                     let edges = if swapped { [edge_b, edge_a] } else { [edge_a, edge_b] };
-                    found.extend(edge_pair(scene, bodies, edges, pair.distance));
+                    found.extend(edge_pair(scene, bodies, edges, pair.limit));
                 }
             } else {
                 self.isa.run(VertexPairs { from: a, to: b, reach, candidates, kept });
                 for &[point, slot] in kept.iter() {
                     let elements = [a.mesh_node(point), b.triangles.element(slot)];
-                    found.extend(vertex_triangle(scene, bodies, elements, pair.distance));
+                    found.extend(vertex_triangle(scene, bodies, elements, pair.limit));
                 }
             }
             cost.polygon_tests += kept.len() as u64;

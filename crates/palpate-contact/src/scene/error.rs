@@ -47,6 +47,18 @@ pub enum SceneError {
         /// Nodes of the body's mesh.
         expected: usize,
     },
+    /// Groups for another number of triangles.
+    #[error(
+        "groups: got {given}, expected {expected}, one for each surface triangle of body {body}"
+    )]
+    GroupCount {
+        /// The body.
+        body: usize,
+        /// Groups given.
+        given: usize,
+        /// Surface triangles of the body's mesh.
+        expected: usize,
+    },
     /// A position that is NaN or infinite.
     #[error("positions[{body}][{node}]: got {position:?}, expected finite numbers")]
     NotFinite {

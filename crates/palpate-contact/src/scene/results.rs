@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use palpate_geometry::Point;
 
+use super::SceneBody;
 use crate::pairs::{PenetratingNode, ProximityPair, TrianglePair};
 
 /// Surface triangles that meet.
@@ -13,6 +14,34 @@ pub struct Intersections {
     pub pairs: Vec<TrianglePair>,
     /// What finding them cost.
     pub stats: DetectionStats,
+}
+
+/// Nodes of surface triangles that meet.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ContactNodes {
+    /// Per body, its nodes, sorted.
+    pub nodes: Vec<Vec<u32>>,
+    /// What finding the triangles cost.
+    pub stats: DetectionStats,
+}
+
+impl ContactNodes {
+    pub(super) fn collect(&mut self, bodies: &[SceneBody], intersections: &Intersections) {
+        self.stats = intersections.stats;
+        self.nodes.resize(bodies.len(), Vec::new());
+        self.nodes.iter_mut().for_each(Vec::clear);
+        for pair in &intersections.pairs {
+            let sides = [(pair.body_a, pair.triangle_a), (pair.body_b, pair.triangle_b)];
+            for (body, triangle) in sides {
+                let corners = bodies[body as usize].mesh.triangles()[triangle as usize];
+                self.nodes[body as usize].extend(corners);
+            }
+        }
+        for nodes in &mut self.nodes {
+            nodes.sort_unstable();
+            nodes.dedup();
+        }
+    }
 }
 
 /// Surface elements closer than the asked distance.

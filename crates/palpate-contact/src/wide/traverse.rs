@@ -109,12 +109,13 @@ impl Traversal {
         }
     }
 
-    /// Collects the slot pairs of neighbouring blocks of one body whose boxes meet and that share no
-    /// node. `range`: of the pairs of its adjacency.
+    /// Collects the slot pairs of neighbouring blocks of one body whose boxes meet, and that share no
+    /// node, or do with `sharing`. `range`: of the pairs of its adjacency.
     pub(crate) fn collect_adjacent(
         &mut self,
         isa: Isa,
         sides: &Sides,
+        sharing: bool,
         range: std::ops::Range<usize>,
         candidates: &mut Vec<[u32; 2]>,
         cost: &mut Cost,
@@ -128,7 +129,9 @@ impl Traversal {
         cost.count(pairs.len());
         cost.leaf_pairs += pairs.len() as u64;
         for ((&pair, &mask), &apart) in pairs.iter().zip(&self.masks).zip(&adjacency.apart[range]) {
-            push_lanes(pair, mask & apart, candidates);
+            let once = if sides.same && pair[0] == pair[1] { UPPER } else { u64::MAX };
+            let wanted = if sharing { !apart & once } else { apart };
+            push_lanes(pair, mask & wanted, candidates);
         }
     }
 

@@ -3,12 +3,15 @@
 use std::sync::Arc;
 
 use palpate_contact::{IntersectionOptions, Method, Scene, SceneOptions, Split, TrianglePair};
-use palpate_geometry::triangles_intersect;
+use palpate_geometry::{
+    triangles_intersect, triangles_intersect_beyond_edge, triangles_intersect_beyond_node,
+};
 use palpate_model::Mesh;
 use proptest::prelude::*;
 
 use crate::scenes::{
-    Case, Positions, Random, as_slices, block, cases, deforming, horseshoe, jittered, soup,
+    Case, Point, Positions, Random, as_slices, block, cases, deforming, horseshoe, jittered, sheet,
+    soup,
 };
 
 pub(crate) fn scene(meshes: &[Arc<Mesh>], options: SceneOptions) -> Scene {
@@ -22,7 +25,7 @@ pub(crate) fn validate(scene: &Scene) {
     }
 }
 
-/// Every pair of triangles that meet, by the exact test alone.
+/// Every pair of triangles that meet, by the exact tests alone; those that share nodes as well.
 fn brute_force(meshes: &[Arc<Mesh>], positions: &Positions) -> Vec<TrianglePair> {
     let mut all = Vec::new();
     for (body, mesh) in meshes.iter().enumerate() {
@@ -34,8 +37,22 @@ fn brute_force(meshes: &[Arc<Mesh>], positions: &Positions) -> Vec<TrianglePair>
     let mut pairs = Vec::new();
     for (i, a) in all.iter().enumerate() {
         for b in &all[i + 1..] {
-            let shared = a.0 == b.0 && a.2.iter().any(|node| b.2.contains(node));
-            if !shared && triangles_intersect(&a.3, &b.3) {
+            let of_a = |node: &&u32| !b.2.contains(node) || a.0 != b.0;
+            let of_b = |node: &&u32| !a.2.contains(node) || a.0 != b.0;
+            let at = |node: &u32| positions[a.0 as usize][*node as usize];
+            let only_a: Vec<Point> = a.2.iter().filter(of_a).map(at).collect();
+            let only_b: Vec<Point> =
+                b.2.iter().filter(of_b).map(|n| positions[b.0 as usize][*n as usize]).collect();
+            let shared: Vec<Point> = a.2.iter().filter(|node| !of_a(node)).map(at).collect();
+            let meet = match (&shared[..], &only_a[..], &only_b[..]) {
+                ([], ..) => triangles_intersect(&a.3, &b.3),
+                (&[v], &[a1, a2], &[b1, b2]) => {
+                    triangles_intersect_beyond_node(&[v, a1, a2], &[v, b1, b2])
+                }
+                (&[v, w], &[a], &[b]) => triangles_intersect_beyond_edge(&[v, w], a, b),
+                _ => true,
+            };
+            if meet {
                 pairs.push(TrianglePair {
                     body_a: a.0,
                     triangle_a: a.1,
@@ -46,6 +63,12 @@ fn brute_force(meshes: &[Arc<Mesh>], positions: &Positions) -> Vec<TrianglePair>
         }
     }
     pairs
+}
+
+fn share_nodes(meshes: &[Arc<Mesh>], pair: &TrianglePair) -> bool {
+    let [a, b] = [(pair.body_a, pair.triangle_a), (pair.body_b, pair.triangle_b)]
+        .map(|(body, triangle)| meshes[body as usize].triangles()[triangle as usize]);
+    pair.body_a == pair.body_b && a.iter().any(|node| b.contains(node))
 }
 
 fn without_same_leaf(scene: &Scene, pairs: &[TrianglePair]) -> Vec<TrianglePair> {
@@ -81,28 +104,28 @@ fn check(case: &Case) -> Vec<usize> {
         for (frame, expected) in case.frames.iter().zip(&expected) {
             scene.update(&as_slices(frame)).expect("finite positions");
             validate(&scene);
-            for (self_contact, same_leaf) in
-                [(true, true), (true, false), (false, true), (false, false)]
-            {
+            for bits in 0..8 {
+                let [self_contact, same_leaf, shared_nodes] = [0, 1, 2].map(|i| bits >> i & 1 == 1);
                 let has_leaves = options.method == Method::Paper;
                 let mut expected = expected.clone();
                 if has_leaves && !same_leaf {
                     expected = without_same_leaf(&scene, &expected);
                 }
                 expected.retain(|pair| self_contact || pair.body_a != pair.body_b);
-                let found = scene.intersections(&IntersectionOptions { self_contact, same_leaf });
-                assert_eq!(
-                    found.pairs, expected,
-                    "{}: {options:?}, self {self_contact}, same leaf {same_leaf}",
-                    case.name
-                );
+                expected.retain(|pair| shared_nodes || !share_nodes(&case.meshes, pair));
+                let wanted = IntersectionOptions { self_contact, same_leaf, shared_nodes };
+                let found = scene.intersections(&wanted);
+                assert_eq!(found.pairs, expected, "{}: {options:?}, {wanted:?}", case.name);
                 let stats = &found.stats;
                 assert!(stats.polygon_tests >= expected.len() as u64);
                 assert!(stats.polygon_tests <= stats.all_pairs);
             }
         }
     }
-    expected.iter().map(Vec::len).collect()
+    let apart = |pairs: &Vec<TrianglePair>| {
+        pairs.iter().filter(|pair| !share_nodes(&case.meshes, pair)).count()
+    };
+    expected.iter().map(apart).collect()
 }
 
 #[test]
@@ -111,6 +134,30 @@ fn every_method_finds_the_pairs_of_the_double_loop() {
         let counts = check(&case);
         let empty = ["single tetrahedron", "nested apart"].contains(&case.name);
         assert_eq!(counts.iter().sum::<usize>() == 0, empty, "{}: {counts:?}", case.name);
+    }
+}
+
+#[test]
+fn a_fold_is_found_where_nodes_are_shared() {
+    // A sheet of 2 x 2 cells, two triangles each.
+    let flat = sheet(2, 2, |p| p);
+    let shared = IntersectionOptions { shared_nodes: true, ..IntersectionOptions::default() };
+    for method in Method::ALL {
+        let mut scene =
+            scene(std::slice::from_ref(&flat), SceneOptions { method, ..Default::default() });
+        assert_eq!(scene.intersections(&shared).pairs, []);
+        let mut fold = |map: fn(Point) -> Point| {
+            let folded: Vec<Point> = flat.nodes().iter().map(|&point| map(point)).collect();
+            scene.update(&[&folded]).expect("finite positions");
+            let apart = scene.intersections(&IntersectionOptions::default()).pairs.len();
+            [apart, scene.intersections(&shared).pairs.len()]
+        };
+        // At right angles along the middle line nothing meets; slightly less than flat neither.
+        assert_eq!(fold(|p| if p[0] > 1.0 { [1.0, p[1], p[0] - 1.0] } else { p }), [0, 0]);
+        assert_eq!(fold(|p| if p[0] > 1.0 { [0.5, p[1], 1e-9] } else { p }), [0, 0]);
+        // Flat: all 4 x 4 pairs of the halves but three, which touch in a node of the middle line only.
+        let [apart, all] = fold(|p| if p[0] > 1.0 { [2.0 - p[0], p[1], p[2]] } else { p });
+        assert_eq!([apart, all], [5, 13]);
     }
 }
 

@@ -1,6 +1,7 @@
 //! Detection against its slow, obvious twins.
 
 mod intersections;
+mod left_out;
 mod organs;
 mod parry;
 mod penetration;

@@ -162,7 +162,7 @@ fn statistics_add_up() {
         assert_eq!(stats.all_pairs, total * (total - 1) / 2);
         assert_eq!(stats.tested_fraction(), stats.polygon_tests as f64 / stats.all_pairs as f64);
         let own: u64 = counts.iter().map(|count| count * (count - 1) / 2).sum();
-        let others = IntersectionOptions { self_contact: false, same_leaf: true };
+        let others = IntersectionOptions { self_contact: false, ..Default::default() };
         assert_eq!(scene.intersections(&others).stats.all_pairs, stats.all_pairs - own);
         match method {
             Method::Paper | Method::Wide => {
