@@ -106,7 +106,7 @@ impl PyScene {
         self_contact: bool,
         close_at_rest: bool,
     ) -> PyResult<ProximityColumns<'py>> {
-        self.find_proximity(py, distance, self_contact, &ProximityOptions { close_at_rest })
+        self.find_proximity(py, distance, self_contact, ProximityOptions { close_at_rest })
     }
 
     fn contact_nodes<'py>(
@@ -115,7 +115,7 @@ impl PyScene {
         self_contact: bool,
     ) -> PyResult<Bound<'py, PyTuple>> {
         let options = IntersectionOptions { self_contact, ..IntersectionOptions::default() };
-        self.find_contact_nodes(py, &options)
+        self.find_contact_nodes(py, options)
     }
 
     fn ignore(&self, py: Python<'_>, body_a: usize, body_b: usize, ignored: bool) -> PyResult<()> {

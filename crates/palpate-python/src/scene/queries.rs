@@ -44,12 +44,12 @@ impl PyScene {
         py: Python<'py>,
         distance: f64,
         self_contact: bool,
-        options: &ProximityOptions,
+        options: ProximityOptions,
     ) -> PyResult<ProximityColumns<'py>> {
         let distance = |a: usize, b: usize| (self_contact || a != b).then_some(distance);
         let (pairs, stats) = py.detach(|| {
             let mut guard = self.lock();
-            let found = guard.0.proximity_with(&distance, options);
+            let found = guard.0.proximity_with(&distance, &options);
             (found.pairs.clone(), stats_row(&found.stats))
         });
         let kind = |pair: &ProximityPair| match pair.kind {
@@ -71,9 +71,9 @@ impl PyScene {
     pub(super) fn find_contact_nodes<'py>(
         &self,
         py: Python<'py>,
-        options: &IntersectionOptions,
+        options: IntersectionOptions,
     ) -> PyResult<Bound<'py, PyTuple>> {
-        let nodes = py.detach(|| self.lock().0.contact_nodes(options).nodes.clone());
+        let nodes = py.detach(|| self.lock().0.contact_nodes(&options).nodes.clone());
         PyTuple::new(py, nodes.iter().map(|nodes| index_vector(py, nodes)))
     }
 }
