@@ -129,8 +129,8 @@ impl Traversal {
         cost.count(pairs.len());
         cost.leaf_pairs += pairs.len() as u64;
         for ((&pair, &mask), &apart) in pairs.iter().zip(&self.masks).zip(&adjacency.apart[range]) {
-            let once = if sides.same && pair[0] == pair[1] { UPPER } else { u64::MAX };
-            let wanted = if sharing { !apart & once } else { apart };
+            let once = || if sides.same && pair[0] == pair[1] { UPPER } else { u64::MAX };
+            let wanted = if sharing { !apart & once() } else { apart };
             push_lanes(pair, mask & wanted, candidates);
         }
     }
