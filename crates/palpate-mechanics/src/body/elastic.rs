@@ -12,7 +12,7 @@ use glam::{DMat3, DQuat, DVec3};
 use palpate_geometry::Point;
 use palpate_model::Body;
 use palpate_solver::{
-    BlockMatrix, BlockPattern, Cholesky, FactorError, FactorStats, SolveWorkspace,
+    BlockMatrix, BlockPattern, Cholesky, FactorError, FactorStats, Precision, SolveWorkspace,
 };
 
 use super::element::{lame_parameters, shape_gradients, stiffness_block};
@@ -106,7 +106,7 @@ impl ElasticBody {
             free_index[node as usize] = place as u32;
         }
         let system = system_matrix(&stiffness, &masses, &free_index, body, time_step);
-        let factor = Cholesky::new(&system).map_err(|source| {
+        let factor = Cholesky::with_precision(&system, Precision::Single).map_err(|source| {
             let source = in_body_numbering(source, &free_nodes);
             MechanicsError::Factor { body: index, name: name(), source }
         })?;
@@ -194,7 +194,9 @@ impl ElasticBody {
             let force = DVec3::from_array(self.step.force[node]) + to_frame * external;
             self.step.correction[place] = force.to_array();
         }
-        self.factor.solve_in_place(&mut self.step.correction, &mut self.step.workspace);
+        let mut correction = std::mem::take(&mut self.step.correction);
+        self.solve(&mut correction);
+        self.step.correction = correction;
         if self.is_unattached() {
             self.remove_torque(self.next_spin(x, forces, &[]));
         }
@@ -322,9 +324,9 @@ impl ElasticBody {
             return;
         }
         let (center, to_frame) = (self.predicted_center(), self.step.frame.transpose());
+        let gain = self.gain();
         let step = &mut self.step;
         let arms = step.positions.iter().map(|&x| to_frame * (x - center));
-        let gain = self.time_step * self.time_step / (1.0 + self.mass_damping * self.time_step);
         if step.turning.begin(&self.masses, arms, gain) {
             self.factor.solve_three_in_place(&mut step.turning.loaded, &mut step.workspace);
             step.turning.finish(&self.masses);
@@ -371,12 +373,41 @@ impl ElasticBody {
         for (load, &node) in self.step.response.iter_mut().zip(&self.free_nodes) {
             *load = (to_frame * DVec3::from_array(forces[node as usize])).to_array();
         }
-        let turning = self.step.turning_known.then_some(&self.step.turning);
-        let torque = turning.map(|turning| turning.balance(&self.masses, &mut self.step.response));
-        self.factor.solve_in_place(&mut self.step.response, &mut self.step.workspace);
-        if let (Some(turning), Some(torque)) = (turning, torque) {
-            turning.turn(&self.masses, torque, &mut self.step.response);
+        let mut response = std::mem::take(&mut self.step.response);
+        let balance = |turning: &Turning| turning.balance(&self.masses, &mut response);
+        let torque = self.turning().map(balance);
+        self.solve(&mut response);
+        if let (Some(turning), Some(torque)) = (self.turning(), torque) {
+            turning.turn(&self.masses, torque, &mut response);
         }
+        self.step.response = response;
+    }
+
+    /// Turns loads on the free nodes into displacements, A^-1. An unattached body is moved as a whole
+    /// by what its mass says, in double precision, and only the rest is solved for.
+    fn solve(&mut self, values: &mut [[f64; 3]]) {
+        if !self.is_unattached() {
+            self.factor.solve_in_place(values, &mut self.step.workspace);
+            return;
+        }
+        let total: f64 = self.masses.iter().sum();
+        let load: DVec3 = values.iter().map(|&value| DVec3::from_array(value)).sum();
+        let acceleration = load / total;
+        for (&m, value) in self.masses.iter().zip(&mut *values) {
+            *value = (DVec3::from_array(*value) - m * acceleration).to_array();
+        }
+        self.factor.solve_in_place(values, &mut self.step.workspace);
+        let moments = self.masses.iter().zip(&*values);
+        let moment: DVec3 = moments.map(|(&m, &value)| m * DVec3::from_array(value)).sum();
+        let shift = self.gain() * acceleration - moment / total;
+        for value in values {
+            *value = (DVec3::from_array(*value) + shift).to_array();
+        }
+    }
+
+    /// Displacement [m] of a step under unit force per unit mass.
+    fn gain(&self) -> f64 {
+        self.time_step * self.time_step / (1.0 + self.mass_damping * self.time_step)
     }
 
     /// Positions at the end of the step with the response to contact forces.
