@@ -23,9 +23,13 @@ pub(crate) struct MovingBody {
     pub(crate) forces: Vec<Point>,
     /// Contact forces [N] of the last finished step.
     pub(crate) contact_forces: Vec<Point>,
-    /// Positions [m] at the end of this step if nothing touches.
-    pub(crate) free_positions: Vec<Point>,
-    expected_positions: Vec<Point>,
+    /// Positions [m] at the end of this step if contact forces stay as they were in the last one.
+    pub(crate) expected_positions: Vec<Point>,
+    /// Those forces [N], and the nodes that they act on.
+    expected_forces: Vec<Point>,
+    expected_nodes: Vec<u32>,
+    /// Contact forces less the expected ones [N].
+    change: Vec<Point>,
     pub(crate) next_positions: Vec<Point>,
     pub(crate) next_velocities: Vec<Point>,
     pub(crate) motion: Motion,
@@ -75,8 +79,10 @@ impl MovingBody {
             velocities: zero.clone(),
             forces: zero.clone(),
             contact_forces: zero.clone(),
-            free_positions: nodes.to_vec(),
             expected_positions: nodes.to_vec(),
+            expected_forces: zero.clone(),
+            expected_nodes: Vec::with_capacity(body.mesh.surface_nodes().len()),
+            change: zero.clone(),
             next_positions: nodes.to_vec(),
             next_velocities: zero,
             motion: Motion::default(),
@@ -107,38 +113,37 @@ impl MovingBody {
         }
     }
 
-    /// Positions at the end of this step if contact forces stay as they were in the last one.
-    pub(crate) fn expected_positions(&self) -> &[Point] {
-        &self.expected_positions
+    /// The expected contact forces [N] by the nodes that they act on.
+    pub(crate) fn expected_forces(&self) -> impl Iterator<Item = (u32, DVec3)> {
+        let force = |&node: &u32| (node, DVec3::from_array(self.expected_forces[node as usize]));
+        self.expected_nodes.iter().map(force)
     }
 
-    /// Moves the body as if alone; `surface` are its surface nodes, `end` the time after the step [s].
+    /// Moves the body as if contact forces stayed as they are; `surface` are its surface nodes, `end`
+    /// the time after the step [s].
     pub(crate) fn predict(&mut self, surface: &[u32], end: f64, time_step: f64) {
+        self.expected_nodes.clear();
         match &mut self.kind {
             BodyKind::Elastic(elastic) => {
-                elastic.predict(&self.positions, &self.velocities, &self.forces);
-                elastic.free_positions(&mut self.free_positions);
-                if self.touched {
-                    elastic.prepare_turning();
-                    elastic.respond(Some(&self.contact_forces));
-                    elastic.end_positions(&self.positions, &mut self.expected_positions);
-                } else {
-                    self.expected_positions.copy_from_slice(&self.free_positions);
-                }
+                self.expected_forces.copy_from_slice(&self.contact_forces);
+                let loaded = |&&node: &&u32| self.contact_forces[node as usize] != [0.0; 3];
+                self.expected_nodes.extend(surface.iter().filter(loaded));
+                let contact = self.touched.then_some(&*self.contact_forces);
+                elastic.predict(&self.positions, &self.velocities, &self.forces, contact);
+                elastic.end_positions(&self.positions, &mut self.expected_positions);
             }
             BodyKind::Rigid { rest, motion } => {
                 let pose = motion.pose(end);
-                for (node, &rest) in self.free_positions.iter_mut().zip(&*rest) {
+                for (node, &rest) in self.expected_positions.iter_mut().zip(&*rest) {
                     *node = pose.apply(rest);
                 }
-                self.expected_positions.copy_from_slice(&self.free_positions);
             }
         }
         self.motion = self.expected_motion(surface, time_step);
     }
 
-    /// How far the surface moves if contact forces stay as they were: without them a body at rest
-    /// would look for contacts much too far away.
+    /// How far the surface moves if contact forces stay as they are: without them a body at rest would
+    /// look for contacts much too far away.
     fn expected_motion(&self, surface: &[u32], time_step: f64) -> Motion {
         let displacement = |&node: &u32| {
             DVec3::from_array(self.expected_positions[node as usize])
@@ -153,7 +158,7 @@ impl MovingBody {
         Motion { mean, spread: spread.fold(0.0, f64::max), deformation }
     }
 
-    /// Makes the compliance columns of `nodes` available.
+    /// Makes the compliance columns of `nodes` available, and of those that forces are expected on.
     pub(crate) fn prepare_compliance(&mut self, nodes: &[u32], step: u64) {
         self.new_columns = match &mut self.kind {
             BodyKind::Elastic(elastic) => {
@@ -161,6 +166,7 @@ impl MovingBody {
                     elastic.prepare_turning();
                 }
                 self.compliance.prepare(elastic, nodes, step)
+                    + self.compliance.prepare(elastic, &self.expected_nodes, step)
             }
             BodyKind::Rigid { .. } => 0,
         };
@@ -170,7 +176,13 @@ impl MovingBody {
     pub(crate) fn advance(&mut self, time_step: f64) {
         match &mut self.kind {
             BodyKind::Elastic(elastic) => {
-                elastic.respond(self.touched.then_some(&self.contact_forces));
+                let touched = self.touched || !self.expected_nodes.is_empty();
+                for ((change, now), expected) in
+                    self.change.iter_mut().zip(&self.contact_forces).zip(&self.expected_forces)
+                {
+                    *change = std::array::from_fn(|k| now[k] - expected[k]);
+                }
+                elastic.respond(touched.then_some(&self.change));
                 elastic.advance(
                     &self.positions,
                     &self.forces,
@@ -180,9 +192,12 @@ impl MovingBody {
                 );
             }
             BodyKind::Rigid { .. } => {
-                self.next_positions.copy_from_slice(&self.free_positions);
-                for ((velocity, new), old) in
-                    self.next_velocities.iter_mut().zip(&self.free_positions).zip(&self.positions)
+                self.next_positions.copy_from_slice(&self.expected_positions);
+                for ((velocity, new), old) in self
+                    .next_velocities
+                    .iter_mut()
+                    .zip(&self.expected_positions)
+                    .zip(&self.positions)
                 {
                     *velocity = std::array::from_fn(|k| (new[k] - old[k]) / time_step);
                 }
@@ -193,6 +208,17 @@ impl MovingBody {
     /// The first node whose next state is not finite.
     pub(crate) fn first_broken_node(&self) -> Option<usize> {
         first_not_finite(&self.next_positions).or_else(|| first_not_finite(&self.next_velocities))
+    }
+
+    /// The shape for which the response is known, for [`MovingBody::set_shape`]; may be empty.
+    pub(crate) fn shape(&self) -> Vec<Point> {
+        self.elastic().map_or_else(Vec::new, ElasticBody::shape)
+    }
+
+    pub(crate) fn set_shape(&mut self, shape: &[Point]) {
+        if let BodyKind::Elastic(elastic) = &mut self.kind {
+            elastic.set_shape(shape);
+        }
     }
 
     pub(crate) fn commit(&mut self) {

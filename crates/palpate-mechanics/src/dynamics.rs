@@ -449,6 +449,7 @@ impl Dynamics {
                 positions: body.positions.clone(),
                 velocities: body.velocities.clone(),
                 forces: body.forces.clone(),
+                shape: body.shape(),
             }
         });
         State {
@@ -474,6 +475,9 @@ impl Dynamics {
             check_array(body, count, &saved.positions, "the position")?;
             check_array(body, count, &saved.velocities, "the velocity")?;
             check_array(body, count, &saved.forces, "the force")?;
+            if !saved.shape.is_empty() {
+                check_array(body, count, &saved.shape, "the shape")?;
+            }
         }
         let fits = |contact: &ContactForce| {
             let corners = (0..4).all(|corner| {
@@ -490,6 +494,7 @@ impl Dynamics {
             body.positions.copy_from_slice(&saved.positions);
             body.velocities.copy_from_slice(&saved.velocities);
             body.forces.copy_from_slice(&saved.forces);
+            body.set_shape(&saved.shape);
         }
         self.set_contact_forces(&state.contacts);
         self.response.restore(&state.contacts);

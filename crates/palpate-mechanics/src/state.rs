@@ -49,4 +49,7 @@ pub struct BodyState {
     pub velocities: Vec<Point>,
     /// External forces [N].
     pub forces: Vec<Point>,
+    /// Shape in the body's frame for which its response to contact was computed last [m]; empty if
+    /// it was not.
+    pub shape: Vec<Point>,
 }

@@ -10,25 +10,20 @@
 
 use glam::{DMat3, DVec3};
 
-/// Rotations of one body in its frame and its response to their inertial loads.
+/// Rotations of one body in its frame.
 #[derive(Debug, Default)]
-pub(crate) struct Turning {
+pub(super) struct Rotations {
     /// Arm of every node about the centre, in the frame [m].
     arms: Vec<DVec3>,
     /// S, the inverse inertia [1/(kg m²)].
     inverse_inertia: DMat3,
     /// k [s²].
     gain: f64,
-    /// Z = A^-1 M Q: entry `3 * axis + k` is along k for the rotation about `axis`.
-    pub(super) loaded: Vec<[f64; 9]>,
-    /// `S Q^T M Z S + k S`.
-    both: DMat3,
 }
 
-impl Turning {
-    /// Takes the arms of all nodes about their centre and fills `loaded` with M Q, which the caller
-    /// solves with A before [`Turning::finish`].
-    pub(super) fn begin(
+impl Rotations {
+    /// Takes the arms of all nodes about their centre; false if the body has no inertia about an axis.
+    pub(super) fn set(
         &mut self,
         masses: &[f64],
         arms: impl Iterator<Item = DVec3>,
@@ -37,48 +32,28 @@ impl Turning {
         self.arms.clear();
         self.arms.extend(arms);
         self.gain = gain;
-        let mut inertia = DMat3::ZERO;
-        self.loaded.clear();
+        let mut second = DMat3::ZERO;
         for (&m, &r) in masses.iter().zip(&self.arms) {
-            let rotations = [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| m * axis.cross(r));
-            self.loaded.push(std::array::from_fn(|entry| rotations[entry / 3][entry % 3]));
-            let [x, y, z] = rotations.map(|mv| r.cross(mv));
-            inertia += DMat3::from_cols(x, y, z);
+            second += DMat3::from_cols(m * r.x * r, m * r.y * r, m * r.z * r);
         }
-        self.inverse_inertia = inertia.inverse();
+        let trace = second.x_axis.x + second.y_axis.y + second.z_axis.z;
+        self.inverse_inertia = (DMat3::from_diagonal(DVec3::splat(trace)) - second).inverse();
         self.inverse_inertia.is_finite()
     }
 
-    /// Completes what [`Turning::begin`] began.
-    pub(super) fn finish(&mut self, masses: &[f64]) {
-        let s = self.inverse_inertia;
-        let mut inner = DMat3::ZERO;
-        for ((&m, &r), z) in masses.iter().zip(&self.arms).zip(&self.loaded) {
-            let [x, y, z] = columns(z).map(|column| m * r.cross(column));
-            inner += DMat3::from_cols(x, y, z);
-        }
-        self.both = s * (0.5 * (inner + inner.transpose())) * s + self.gain * s;
+    /// Arms of all nodes about the centre, in the frame [m].
+    pub(super) fn arms(&self) -> &[DVec3] {
+        &self.arms
     }
 
-    /// What P adds to the response of A^-1 alone to forces on some nodes: two vectors to hand to
-    /// [`Turning::displacement`].
-    pub(crate) fn coefficients(&self, loads: impl Iterator<Item = (u32, DVec3)>) -> [DVec3; 2] {
-        let (mut torque, mut loaded) = (DVec3::ZERO, DVec3::ZERO);
-        for (node, load) in loads {
-            torque += self.arms[node as usize].cross(load);
-            loaded += DVec3::from_array(
-                columns(&self.loaded[node as usize]).map(|column| column.dot(load)),
-            );
+    /// Largest difference of an arm from that of other rotations, relative to the longest arm.
+    pub(super) fn change(&self, other: &Self) -> f64 {
+        let (mut change, mut radius) = (0.0_f64, 0.0_f64);
+        for (&arm, &other) in self.arms.iter().zip(&other.arms) {
+            change = change.max((arm - other).length_squared());
+            radius = radius.max(arm.length_squared());
         }
-        let s = self.inverse_inertia;
-        [self.both * torque - s * loaded, s * torque]
-    }
-
-    /// Displacement of a node that P adds.
-    pub(crate) fn displacement(&self, node: u32, [turn, counter]: [DVec3; 2]) -> DVec3 {
-        let [x, y, z] = columns(&self.loaded[node as usize]);
-        let counter = counter.x * x + counter.y * y + counter.z * z;
-        turn.cross(self.arms[node as usize]) - counter
+        (change / radius).sqrt()
     }
 
     /// Takes the inertial loads of the turn out of `loads`; returns their torque.
@@ -100,6 +75,72 @@ impl Turning {
         for (r, d) in self.arms.iter().zip(response) {
             *d = (DVec3::from_array(*d) + turn.cross(*r)).to_array();
         }
+    }
+}
+
+/// Rotations of one body and its response to their inertial loads.
+#[derive(Debug, Default)]
+pub(crate) struct Turning {
+    rotations: Rotations,
+    /// Z = A^-1 M Q: entry `3 * axis + k` is along k for the rotation about `axis`.
+    pub(super) loaded: Vec<[f64; 9]>,
+    /// `S Q^T M Z S + k S`.
+    both: DMat3,
+}
+
+impl Turning {
+    /// Takes the arms of all nodes about their centre and fills `loaded` with M Q, which the caller
+    /// solves with A before [`Turning::finish`].
+    pub(super) fn begin(
+        &mut self,
+        masses: &[f64],
+        arms: impl Iterator<Item = DVec3>,
+        gain: f64,
+    ) -> bool {
+        let turns = self.rotations.set(masses, arms, gain);
+        self.loaded.clear();
+        for (&m, &r) in masses.iter().zip(&self.rotations.arms) {
+            let rotations = [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| m * axis.cross(r));
+            self.loaded.push(std::array::from_fn(|entry| rotations[entry / 3][entry % 3]));
+        }
+        turns
+    }
+
+    /// Completes what [`Turning::begin`] began.
+    pub(super) fn finish(&mut self, masses: &[f64]) {
+        let s = self.rotations.inverse_inertia;
+        let mut inner = DMat3::ZERO;
+        for ((&m, &r), z) in masses.iter().zip(&self.rotations.arms).zip(&self.loaded) {
+            let [x, y, z] = columns(z).map(|column| m * r.cross(column));
+            inner += DMat3::from_cols(x, y, z);
+        }
+        self.both = s * (0.5 * (inner + inner.transpose())) * s + self.rotations.gain * s;
+    }
+
+    /// The rotations that it holds for.
+    pub(super) fn rotations(&self) -> &Rotations {
+        &self.rotations
+    }
+
+    /// What P adds to the response of A^-1 alone to forces on some nodes: two vectors to hand to
+    /// [`Turning::displacement`].
+    pub(crate) fn coefficients(&self, loads: impl Iterator<Item = (u32, DVec3)>) -> [DVec3; 2] {
+        let (mut torque, mut loaded) = (DVec3::ZERO, DVec3::ZERO);
+        for (node, load) in loads {
+            torque += self.rotations.arms[node as usize].cross(load);
+            loaded += DVec3::from_array(
+                columns(&self.loaded[node as usize]).map(|column| column.dot(load)),
+            );
+        }
+        let s = self.rotations.inverse_inertia;
+        [self.both * torque - s * loaded, s * torque]
+    }
+
+    /// Displacement of a node that P adds.
+    pub(crate) fn displacement(&self, node: u32, [turn, counter]: [DVec3; 2]) -> DVec3 {
+        let [x, y, z] = columns(&self.loaded[node as usize]);
+        let counter = counter.x * x + counter.y * y + counter.z * z;
+        turn.cross(self.rotations.arms[node as usize]) - counter
     }
 }
 
@@ -135,11 +176,11 @@ mod tests {
         for (node, load) in loads {
             response[node as usize] = load.to_array();
         }
-        let torque = turning.balance(&masses, &mut response);
+        let torque = turning.rotations().balance(&masses, &mut response);
         for (d, softness) in response.iter_mut().zip(softness) {
             *d = d.map(|value| softness * value);
         }
-        turning.turn(&masses, torque, &mut response);
+        turning.rotations().turn(&masses, torque, &mut response);
 
         let coefficients = turning.coefficients(loads.into_iter());
         for node in 0..5_u32 {

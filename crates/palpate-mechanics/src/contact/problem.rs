@@ -50,6 +50,8 @@ pub(crate) struct Problem {
     compliance: Vec<f64>,
     /// Displacement of every contact node under unit forces along the axes of one candidate.
     displacements: Vec<DMat3>,
+    /// Displacement of every contact node by the forces that were expected.
+    expected: Vec<DVec3>,
 }
 
 impl Problem {
@@ -108,6 +110,7 @@ impl Problem {
     ) {
         self.blocks.clear();
         self.row_count = 0;
+        self.displace_as_expected(&body);
         for candidate in candidates {
             let (first, second) = candidate.normal.any_orthonormal_pair();
             let axes = DMat3::from_cols(candidate.normal, first, second);
@@ -120,11 +123,15 @@ impl Problem {
                     *own_place = place;
                 }
             }
+            let mut free = expected_displacement(candidate, &body);
+            for (&place, weight) in places.iter().zip(candidate.weights) {
+                free -= weight * self.expected[place as usize];
+            }
             self.blocks.push(Block {
                 first: self.row_count as u32,
                 rows,
                 axes,
-                free: axes.transpose() * free_displacement(candidate, &body),
+                free: axes.transpose() * free,
                 places,
             });
             self.row_count += rows as usize;
@@ -161,6 +168,38 @@ impl Problem {
                 let part = &self.bodies[body as usize];
                 let first = part.first as usize;
                 self.displacements[first..first + part.nodes.len()].fill(DMat3::ZERO);
+            }
+        }
+    }
+
+    /// Finds the displacements by the expected forces, which the expected positions contain.
+    fn displace_as_expected<'a>(&mut self, body: impl Fn(usize) -> &'a MovingBody) {
+        self.expected.clear();
+        self.expected.resize(self.place_count + 1, DVec3::ZERO);
+        for (index, part) in self.bodies.iter().enumerate() {
+            let moving = body(index);
+            let Some(elastic) = moving.elastic() else { continue };
+            if part.nodes.is_empty() {
+                continue;
+            }
+            let frame = elastic.frame();
+            let loads = || moving.expected_forces().map(|(node, f)| (node, frame.transpose() * f));
+            let moved = &mut self.expected[part.first as usize..][..part.nodes.len()];
+            for (node, load) in loads() {
+                let Some(column) = moving.compliance.column(node) else { continue };
+                for (moved, &node) in moved.iter_mut().zip(&part.nodes) {
+                    let entries = column[moving.compliance.place(node) as usize].map(f64::from);
+                    *moved += DMat3::from_cols_array(&entries) * load;
+                }
+            }
+            if let Some(turning) = elastic.turning() {
+                let coefficients = turning.coefficients(loads());
+                for (moved, &node) in moved.iter_mut().zip(&part.nodes) {
+                    *moved += turning.displacement(node, coefficients);
+                }
+            }
+            for moved in moved {
+                *moved = frame * *moved;
             }
         }
     }
@@ -242,20 +281,12 @@ impl Problem {
     }
 }
 
-/// Relative displacement of the two sides in the step if nothing touched [m].
-pub(crate) fn free_displacement<'a>(
-    candidate: &Candidate,
-    body: impl Fn(usize) -> &'a MovingBody,
-) -> DVec3 {
-    displacement_to(candidate, body, |body| &body.free_positions)
-}
-
 /// Relative displacement of the two sides in the step if contact forces stayed as they were [m].
 pub(crate) fn expected_displacement<'a>(
     candidate: &Candidate,
     body: impl Fn(usize) -> &'a MovingBody,
 ) -> DVec3 {
-    displacement_to(candidate, body, MovingBody::expected_positions)
+    displacement_to(candidate, body, |body| &body.expected_positions)
 }
 
 /// Relative displacement of the two sides in the step as it was computed last [m].

@@ -1,0 +1,308 @@
+//! The two halves of a step: where the body goes under the contact forces of the last one, and how it
+//! responds when they change.
+
+use glam::{DMat3, DVec3};
+use palpate_geometry::Point;
+use palpate_solver::SolveWorkspace;
+
+use super::{ElasticBody, FIXED};
+use crate::body::frame::best_rotation;
+use crate::body::inertia::{Inertia, RunningInertia};
+use crate::body::turning::{Rotations, Turning};
+
+/// Part of the body's radius by which its shape may change before its response is computed again.
+const SHAPE_TOLERANCE: f64 = 1e-3;
+
+/// What a step computes; kept between its two halves.
+pub(super) struct Step {
+    pub(super) start: Inertia,
+    pub(super) frame: DMat3,
+    /// Predicted positions and velocities.
+    pub(super) positions: Vec<DVec3>,
+    pub(super) velocities: Vec<DVec3>,
+    /// Velocity of the deformation in the frame, without the body's rotation.
+    deformation: Vec<DVec3>,
+    strain: Vec<[f64; 3]>,
+    force: Vec<[f64; 3]>,
+    /// Correction of the free nodes in the frame [m].
+    pub(super) correction: Vec<[f64; 3]>,
+    /// Response of the free nodes in the frame to the contact forces that are expected [m].
+    expected: Vec<[f64; 3]>,
+    /// Response to the change of contact forces [m].
+    response: Vec<[f64; 3]>,
+    pub(super) columns: Vec<[f64; 9]>,
+    /// Rotations of the predicted positions of an unattached body.
+    rotations: Rotations,
+    /// How contact forces turn the body: known once it has been touched in about this shape.
+    pub(super) turning: Turning,
+    pub(super) turning_known: bool,
+    /// Whether contact forces act in this step.
+    touched: bool,
+    pub(super) workspace: SolveWorkspace,
+}
+
+impl Step {
+    pub(super) fn new(
+        start: Inertia,
+        node_count: usize,
+        free_count: usize,
+        workspace: SolveWorkspace,
+    ) -> Self {
+        Self {
+            start,
+            frame: DMat3::IDENTITY,
+            positions: vec![DVec3::ZERO; node_count],
+            velocities: vec![DVec3::ZERO; node_count],
+            deformation: vec![DVec3::ZERO; node_count],
+            strain: vec![[0.0; 3]; node_count],
+            force: vec![[0.0; 3]; node_count],
+            correction: vec![[0.0; 3]; free_count],
+            expected: vec![[0.0; 3]; free_count],
+            response: vec![[0.0; 3]; free_count],
+            columns: vec![[0.0; 9]; free_count],
+            rotations: Rotations::default(),
+            turning: Turning::default(),
+            turning_known: false,
+            touched: false,
+            workspace,
+        }
+    }
+}
+
+impl ElasticBody {
+    /// Predicts the motion and corrects it by all forces, `contact` being those of the last step.
+    pub(in crate::body) fn predict(
+        &mut self,
+        x: &[Point],
+        v: &[Point],
+        forces: &[Point],
+        contact: Option<&[Point]>,
+    ) {
+        let dt = self.time_step;
+        self.step.start = Inertia::new(&self.masses, x, v);
+        if self.is_unattached() {
+            self.predict_rigidly(x, v);
+        } else {
+            for (node, predicted) in self.step.positions.iter_mut().enumerate() {
+                let (x, v) = (DVec3::from_array(x[node]), DVec3::from_array(v[node]));
+                let free = self.free_index[node] != FIXED;
+                *predicted = if free { x + dt * v } else { x };
+                self.step.velocities[node] = if free { v } else { DVec3::ZERO };
+            }
+        }
+        self.step.frame = self.fit_frame();
+        self.find_rotations();
+        self.internal_forces();
+        self.load_elastic(forces);
+        self.step.touched = contact.is_some();
+        self.step.response.fill([0.0; 3]);
+        let mut correction = std::mem::take(&mut self.step.correction);
+        let mut expected = std::mem::take(&mut self.step.expected);
+        if let Some(contact) = contact {
+            self.prepare_turning();
+            self.load(&mut expected, contact);
+            let torque = self.turning().map(|_| self.balance(&mut expected));
+            self.solve(&mut correction, Some(&mut expected));
+            if let Some(torque) = torque {
+                self.step.rotations.turn(&self.masses, torque, &mut expected);
+            }
+        } else {
+            expected.fill([0.0; 3]);
+            self.solve(&mut correction, None);
+        }
+        (self.step.correction, self.step.expected) = (correction, expected);
+        if self.is_unattached() {
+            self.remove_torque(self.next_spin(x, forces, &[]));
+        }
+    }
+
+    /// Writes all forces but contact on the free nodes, in the frame, to `correction`.
+    fn load_elastic(&mut self, forces: &[Point]) {
+        let to_frame = self.step.frame.transpose();
+        for (load, &node) in self.step.correction.iter_mut().zip(&self.free_nodes) {
+            let node = node as usize;
+            let mass = self.masses[node];
+            let external = DVec3::from_array(forces[node])
+                + mass * (self.gravity - self.mass_damping * self.step.velocities[node]);
+            let force = DVec3::from_array(self.step.force[node]) + to_frame * external;
+            *load = force.to_array();
+        }
+    }
+
+    /// Frame of the predicted positions.
+    fn fit_frame(&mut self) -> DMat3 {
+        let center = self.predicted_center();
+        let mut fit = DMat3::ZERO;
+        for ((&m, &x), &rest) in self.masses.iter().zip(&self.step.positions).zip(&self.rest) {
+            let r = m * (x - center);
+            fit += DMat3::from_cols(rest.x * r, rest.y * r, rest.z * r);
+        }
+        best_rotation(fit)
+    }
+
+    fn predicted_center(&self) -> DVec3 {
+        let mut center = DVec3::ZERO;
+        let mut total = 0.0;
+        for (&m, &x) in self.masses.iter().zip(&self.step.positions) {
+            center += m * x;
+            total += m;
+        }
+        center / total
+    }
+
+    /// Elastic and damping forces in the frame at the predicted state.
+    ///
+    /// The frame turns with the body, so the gradient of the energy has one more term; it is what
+    /// makes the torque of the internal forces vanish. Taken explicitly it is unstable when a body
+    /// folds, so it is left out here, and [`ElasticBody::remove_torque`] does its work on the result.
+    /// Where nodes are fixed, they take that torque: it is of second order in the strain.
+    fn internal_forces(&mut self) {
+        let to_frame = self.step.frame.transpose();
+        // Rotation of the predicted body, to be left out of the damping.
+        let mut sum = RunningInertia::default();
+        for (node, &m) in self.masses.iter().enumerate() {
+            sum.add(m, self.step.positions[node], self.step.velocities[node]);
+        }
+        let now = sum.finish();
+        let omega = now.tensor.inverse() * now.spin;
+        for node in 0..self.masses.len() {
+            let r = self.step.positions[node] - now.center;
+            let v = to_frame * (self.step.velocities[node] - now.velocity - omega.cross(r));
+            let r = to_frame * r;
+            self.step.deformation[node] = v;
+            self.step.strain[node] = (r - self.rest[node] + self.damping * v).to_array();
+        }
+        self.stiffness.multiply(&self.step.strain, &mut self.step.force);
+        for force in &mut self.step.force {
+            *force = force.map(|f| -f);
+        }
+    }
+
+    /// Speed of the deformation at a node [m/s].
+    pub(in crate::body) fn deformation_speed(&self, node: u32) -> f64 {
+        self.step.deformation[node as usize].length()
+    }
+
+    /// Finds out how contact forces turn the body, if it is not attached and that is not known.
+    pub(in crate::body) fn prepare_turning(&mut self) {
+        if !self.is_unattached() || self.step.turning_known {
+            return;
+        }
+        let rotations = std::mem::take(&mut self.step.rotations);
+        self.turn_by(rotations.arms().iter().copied());
+        self.step.rotations = rotations;
+    }
+
+    /// Finds out how contact forces turn the body in the shape that `arms` give.
+    fn turn_by(&mut self, arms: impl Iterator<Item = DVec3>) {
+        let gain = self.gain();
+        let Self { step, masses, factor, .. } = self;
+        step.turning_known = step.turning.begin(masses, arms, gain);
+        if step.turning_known {
+            factor.solve_three_in_place(&mut step.turning.loaded, &mut step.workspace);
+            step.turning.finish(masses);
+        }
+    }
+
+    /// Finds the rotations of an unattached body as predicted, and gives up what is known of its
+    /// turning when it has deformed since.
+    fn find_rotations(&mut self) {
+        if !self.is_unattached() {
+            return;
+        }
+        let (center, to_frame) = (self.predicted_center(), self.step.frame.transpose());
+        let gain = self.gain();
+        let Self { step, masses, .. } = self;
+        let arms = step.positions.iter().map(|&x| to_frame * (x - center));
+        let turns = step.rotations.set(masses, arms, gain);
+        step.turning_known &=
+            turns && step.rotations.change(step.turning.rotations()) <= SHAPE_TOLERANCE;
+    }
+
+    /// How contact forces turn the body; `None` if it is attached.
+    pub(crate) fn turning(&self) -> Option<&Turning> {
+        self.step.turning_known.then_some(&self.step.turning)
+    }
+
+    /// The shape for which the turning is known; empty if it is not.
+    pub(in crate::body) fn shape(&self) -> Vec<Point> {
+        let arms = self.turning().map_or(&[] as &[DVec3], |turning| turning.rotations().arms());
+        arms.iter().map(DVec3::to_array).collect()
+    }
+
+    /// Goes back to a shape given by [`ElasticBody::shape`].
+    pub(in crate::body) fn set_shape(&mut self, shape: &[Point]) {
+        self.step.turning_known = false;
+        if !shape.is_empty() {
+            self.turn_by(shape.iter().map(|&arm| DVec3::from_array(arm)));
+        }
+    }
+
+    /// Computes the response to `change`, the contact forces less those that were expected [N]; `None`
+    /// when no contact forces act nor did so before.
+    pub(in crate::body) fn respond(&mut self, change: Option<&[Point]>) {
+        self.step.touched = change.is_some();
+        self.step.response.fill([0.0; 3]);
+        let Some(change) = change.filter(|change| change.iter().any(|&f| f != [0.0; 3])) else {
+            return;
+        };
+        let mut response = std::mem::take(&mut self.step.response);
+        self.load(&mut response, change);
+        let torque = self.turning().map(|_| self.balance(&mut response));
+        self.solve(&mut response, None);
+        if let Some(torque) = torque {
+            self.step.rotations.turn(&self.masses, torque, &mut response);
+        }
+        self.step.response = response;
+    }
+
+    fn balance(&self, loads: &mut [[f64; 3]]) -> DVec3 {
+        self.step.rotations.balance(&self.masses, loads)
+    }
+
+    /// Writes forces on the free nodes, turned into the frame, to `loads`.
+    fn load(&self, loads: &mut [[f64; 3]], forces: &[Point]) {
+        let to_frame = self.step.frame.transpose();
+        for (load, &node) in loads.iter_mut().zip(&self.free_nodes) {
+            *load = (to_frame * DVec3::from_array(forces[node as usize])).to_array();
+        }
+    }
+
+    /// Displacement of the free nodes from the prediction.
+    fn corrections(&self) -> impl Iterator<Item = (usize, DVec3)> {
+        let step = &self.step;
+        let parts = step.correction.iter().zip(&step.expected).zip(&step.response);
+        self.free_nodes.iter().zip(parts).map(|(&node, ((&a, &b), &c))| {
+            let sum = DVec3::from_array(a) + DVec3::from_array(b) + DVec3::from_array(c);
+            (node as usize, step.frame * sum)
+        })
+    }
+
+    /// Positions at the end of the step.
+    pub(in crate::body) fn end_positions(&self, x: &[Point], positions: &mut [Point]) {
+        positions.copy_from_slice(x);
+        for (node, d) in self.corrections() {
+            positions[node] = (self.step.positions[node] + d).to_array();
+        }
+    }
+
+    /// The state after the step.
+    pub(in crate::body) fn advance(
+        &self,
+        x: &[Point],
+        forces: &[Point],
+        contact_forces: &[Point],
+        next_x: &mut [Point],
+        next_v: &mut [Point],
+    ) {
+        next_v.fill([0.0; 3]);
+        self.end_positions(x, next_x);
+        for (node, d) in self.corrections() {
+            next_v[node] = (self.step.velocities[node] + d / self.time_step).to_array();
+        }
+        if self.is_unattached() {
+            let target = self.next_spin(x, forces, contact_forces);
+            self.correct_spin(target, self.step.touched, next_x, next_v);
+        }
+    }
+}
