@@ -1,4 +1,4 @@
-"""The command line: `palpate check | tree | detect | simulate | convert | format`."""
+"""The command line, `palpate --help`: check, detect, simulate, bench and more."""
 
 from palpate.cli.app import app, main
 

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from palpate._core import __version__
+from palpate.cli.bench import bench_app
 from palpate.cli.check import check
 from palpate.cli.convert import convert
 from palpate.cli.detect import detect
@@ -15,6 +16,7 @@ from palpate.cli.format import format_file
 from palpate.cli.output import reporting
 from palpate.cli.simulate import simulate
 from palpate.cli.tree import tree
+from palpate.cli.tune import tune
 
 app = typer.Typer(
     name="palpate",
@@ -50,10 +52,12 @@ for _name, _command in (
     ("tree", tree),
     ("detect", detect),
     ("simulate", simulate),
+    ("tune", tune),
     ("convert", convert),
     ("format", format_file),
 ):
     app.command(_name)(reporting(_command))
+app.add_typer(bench_app)
 
 
 def main() -> None:

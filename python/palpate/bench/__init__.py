@@ -1,0 +1,1 @@
+"""Measurements: the paper's evaluation, growth with size, other libraries, tuning."""

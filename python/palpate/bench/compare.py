@@ -1,0 +1,275 @@
+"""palpate beside other libraries: same scenes, same motion, complete pair lists compared."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from palpate.bench import machine, measure, motion, plots
+from palpate.bench.output import (
+    markdown_table,
+    milliseconds,
+    whole,
+    write_csv,
+    write_json,
+    write_text,
+)
+from palpate.bench.peers import fcl, ipc, libigl, native, ours
+from palpate.bench.peers.contender import Contender, MissingError, Setting
+from palpate.model import Model
+
+#: What makes the contenders of each library, by its name.
+PEERS: Mapping[str, Callable[[Setting], list[Contender]]] = {
+    "palpate": ours.contenders,
+    "parry3d": native.parry,
+    "Embree": native.embree,
+    "ipctk": ipc.ipctk,
+    "coal": fcl.coal,
+    "python-fcl": fcl.python_fcl,
+    "trimesh": fcl.trimesh_manager,
+    "libigl": libigl.libigl,
+}
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """One contender on one model; ``times`` [s] per stage: quartile, median, quartile."""
+
+    model: str
+    query: str
+    contender: str
+    finds: str
+    how: str
+    answer: str
+    times: dict[str, list[float]]
+
+    @property
+    def wall(self) -> float:
+        """Median time of a frame [s]."""
+        return self.times["wall"][1]
+
+
+def run(
+    models: Sequence[tuple[str, Model]],
+    folder: Path,
+    *,
+    peers: Sequence[str] | None = None,
+    frames: int = 24,
+    repeats: int = 7,
+    drawn: bool = True,
+    advance: Callable[[], None] = lambda: None,
+) -> tuple[list[Outcome], dict[str, str]]:
+    """Measure, then write results.json, peers.csv, report.md and the plot into the folder.
+
+    Returns the outcomes and, by name, the libraries that are missing and how to get them.
+    """
+    outcomes: list[Outcome] = []
+    missing: dict[str, str] = {}
+    scenes = []
+    with one_core() as pinned:
+        for name, model in models:
+            setting = Setting(name, model, frames)
+            made, lacking = _measure(setting, peers or list(PEERS), repeats, advance)
+            outcomes += made
+            missing |= lacking
+            scenes.append(
+                {
+                    "model": name,
+                    "triangles": len(setting.triangles),
+                    "pairs": float(np.mean([len(pairs) for pairs in setting.true_pairs])),
+                }
+            )
+    folder.mkdir(parents=True, exist_ok=True)
+    options = {"peers": list(peers or PEERS), "frames": frames, "repeats": repeats}
+    write_json(
+        folder / "results.json",
+        "bench peers",
+        options,
+        motion=motion.DESCRIPTION,
+        one_core=pinned,
+        scenes=scenes,
+        outcomes=[asdict(each) for each in outcomes],
+        missing=missing,
+    )
+    write_csv(folder / "peers.csv", [_flat(each) for each in outcomes])
+    if drawn:
+        _draw(outcomes, folder / "peers.png")
+    write_text(
+        folder / "report.md", *_report(outcomes, scenes, missing, options, pinned, drawn=drawn)
+    )
+    return outcomes, missing
+
+
+@contextlib.contextmanager
+def one_core() -> Iterator[bool]:
+    """Hold this process and its children on one core; yields whether the system can."""
+    if not hasattr(os, "sched_setaffinity"):
+        yield False
+        return
+    before = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, {max(before)})
+    try:
+        yield True
+    finally:
+        os.sched_setaffinity(0, before)
+
+
+def _measure(
+    setting: Setting, peers: Sequence[str], repeats: int, advance: Callable[[], None]
+) -> tuple[list[Outcome], dict[str, str]]:
+    contenders: list[Contender] = []
+    missing: dict[str, str] = {}
+    for peer in peers:
+        try:
+            contenders += PEERS[peer](setting)
+        except MissingError as error:
+            missing[peer] = str(error)
+    timed = measure.measure({each.name: each.run for each in contenders}, repeats, advance)
+    return [
+        Outcome(
+            model=setting.name,
+            query="intersections",
+            contender=each.name,
+            finds=each.answer.value,
+            how=each.how,
+            answer=setting.check(each),
+            times={
+                stage: measure.spread(times).as_list() for stage, times in timed[each.name].items()
+            },
+        )
+        for each in contenders
+    ], missing
+
+
+def _flat(each: Outcome) -> dict[str, Any]:
+    flat: dict[str, Any] = {
+        "model": each.model,
+        "query": each.query,
+        "contender": each.contender,
+        "finds": each.finds,
+        "answer": each.answer,
+    }
+    for stage in ("update", "wall"):
+        low, median, high = each.times.get(stage, ["", "", ""])
+        flat |= {f"{stage}_q1": low, f"{stage}_median": median, f"{stage}_q3": high}
+    return flat
+
+
+def _draw(outcomes: Sequence[Outcome], path: Path) -> None:
+    groups = list(dict.fromkeys((each.model, each.query) for each in outcomes))
+    most = max(sum((each.model, each.query) == group for each in outcomes) for group in groups)
+    made, axes = plots.figure(1, len(groups), width=6.2, height=0.6 + 0.33 * most)
+    for one, group in zip(axes[0], groups, strict=True):
+        shown = sorted(
+            (each for each in outcomes if (each.model, each.query) == group),
+            key=lambda each: -each.wall,
+        )
+        low, median, high = (np.array([each.times["wall"] for each in shown]) * 1e3).T
+        color = [
+            plots.COLORS[1] if each.contender.startswith("palpate") else plots.COLORS[0]
+            for each in shown
+        ]
+        one.barh(
+            range(len(shown)),
+            median,
+            xerr=[median - low, high - median],
+            color=color,
+            height=0.62,
+            error_kw={"elinewidth": 1, "ecolor": plots.INK},
+        )
+        names = [
+            each.contender
+            + {"candidates only": " *", "pairs of different bodies": " †"}.get(each.finds, "")
+            for each in shown
+        ]
+        one.set_yticks(range(len(shown)), names, fontsize=7.5)
+        for index, value in enumerate(median):
+            one.annotate(
+                milliseconds(value / 1e3),
+                (high[index], index),
+                xytext=(4, 0),
+                textcoords="offset points",
+                va="center",
+                fontsize=7,
+                color=plots.INK,
+            )
+        plots.label(
+            one, f"{group[0]}: {group[1]}", "ms per frame (* candidates, † other bodies)", ""
+        )
+        plots.logarithmic(one, "x")
+        one.set_xlim(right=float(high.max()) * 3)
+        one.grid(visible=False, axis="y")
+    plots.save(made, path)
+
+
+def _report(
+    outcomes: Sequence[Outcome],
+    scenes: Sequence[Mapping[str, Any]],
+    missing: Mapping[str, str],
+    options: Mapping[str, Any],
+    pinned: bool,
+    *,
+    drawn: bool,
+) -> Iterator[str]:
+    yield "# Beside other libraries"
+    yield f"Machine: {machine.sentence(machine.describe())}."
+    yield (
+        f"Every contender has the same bodies in the same motion: {motion.DESCRIPTION}. A frame is "
+        f"an update and a query. {options['frames']} frames, {options['repeats']} passes, the "
+        f"contenders taking turns pass by pass, one thread each"
+        + (", all on one core. " if pinned else ". ")
+        + "A time is the median over the passes, averaged over the frames; quartiles are in "
+        "`peers.csv`. palpate and the Python packages are timed from Python, parry and Embree "
+        "inside a Rust program. Taking pairs out of a library's own containers is not counted."
+    )
+    if drawn:
+        yield "![Time per frame of every library](peers.png)"
+    for scene in scenes:
+        name = scene["model"]
+        yield f"## {name}"
+        yield (
+            f"{whole(scene['triangles'])} surface triangles, {whole(scene['pairs'])} pairs meet in "
+            f"the mean frame."
+        )
+        shown = sorted(
+            (each for each in outcomes if each.model == name), key=lambda each: each.wall
+        )
+        fastest = next(
+            (each.wall for each in shown if each.contender.startswith("palpate")), shown[0].wall
+        )
+        yield markdown_table(
+            "contender<|update [ms]|frame [ms]|quartiles|times ours|finds<|answer<",
+            [
+                [
+                    each.contender,
+                    milliseconds(each.times["update"][1]) if "update" in each.times else "-",
+                    milliseconds(each.wall),
+                    " to ".join(milliseconds(each.times["wall"][quartile]) for quartile in (0, 2)),
+                    f"{each.wall / fastest:.1f}",
+                    each.finds,
+                    each.answer,
+                ]
+                for each in shown
+            ],
+        )
+    yield "## How each is used"
+    yield "\n".join(
+        f"- **{name}**: {how}."
+        for name, how in dict.fromkeys((each.contender, each.how) for each in outcomes)
+    )
+    yield (
+        "Answers are compared as complete lists in every frame. Two triangles of one body that "
+        "share a node do not count, for anyone. Libraries that only test bodies against each other "
+        "are compared on those pairs; one that only gives candidates must contain every pair. "
+        "Where a library's own test works in floating point it may differ on pairs that barely "
+        "touch."
+    )
+    if missing:
+        yield "## Missing here"
+        yield "\n".join(f"- {name}: {how}" for name, how in missing.items())

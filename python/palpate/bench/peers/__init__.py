@@ -1,0 +1,1 @@
+"""Other libraries on palpate's scenes: one file each, all behind `Contender`."""

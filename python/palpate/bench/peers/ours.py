@@ -1,0 +1,30 @@
+"""palpate's own methods, called as a Python user calls them."""
+
+from __future__ import annotations
+
+from palpate._core import __version__
+from palpate.bench import tune
+from palpate.bench.measure import scene_pass
+from palpate.bench.peers.contender import Answer, Contender, PairArray, Setting
+from palpate.scene import Scene
+
+
+def contenders(setting: Setting) -> list[Contender]:
+    """The wide method, the paper's at its best leaf size, and spatial hashing, one thread each."""
+    best = tune.tune(setting.model, methods=["paper"], frames=4, repeats=3)[0][0]
+    return [
+        _contender(setting, "wide", None, "refitted; exact"),
+        _contender(setting, "paper", best.leaf_size, "refitted, its best leaf size; exact"),
+        _contender(setting, "hash", None, "spatial hashing (Teschner et al. 2003); exact"),
+    ]
+
+
+def _contender(setting: Setting, method: str, leaf_size: int | None, how: str) -> Contender:
+    scene = Scene(setting.model, method=method, leaf_size=leaf_size)
+
+    def found(frame: int) -> PairArray:
+        scene.update(setting.frames[frame])
+        return setting.stacked(scene.intersections().pairs)
+
+    name = f"palpate {__version__}, {method}" + (f", K = {leaf_size}" if leaf_size else "")
+    return Contender(name, Answer.PAIRS, how, scene_pass(scene, setting.frames), found)

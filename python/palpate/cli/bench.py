@@ -1,0 +1,280 @@
+"""`palpate bench paper | scaling | peers`: measurements with plots and a report."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.text import Text
+
+from palpate.bench import compare, paper, plots, scaling
+from palpate.bench.output import milliseconds
+from palpate.cli.opening import open_model
+from palpate.cli.output import JsonOption, console, print_json, reporting, table, whole
+from palpate.model import Model
+
+ModelsArgument = Annotated[
+    list[str] | None,
+    typer.Argument(
+        metavar="[MODEL]...",
+        help="Models to measure; the paper's two cases if none is named.",
+        show_default=False,
+    ),
+]
+FramesOption = Annotated[int, typer.Option(min=2, help="Frames of the recorded motion.")]
+RepeatsOption = Annotated[int, typer.Option(min=1, help="Passes over the motion that count.")]
+PlotsOption = Annotated[bool, typer.Option("--plots/--no-plots", help="Draw plots (matplotlib).")]
+
+_DEFAULT_MODELS = ("paper1", "paper2")
+
+bench_app = typer.Typer(
+    name="bench",
+    help="Measure: the paper's evaluation, growth with size, other libraries.",
+    no_args_is_help=True,
+)
+
+
+def _output_option(name: str) -> Any:
+    return typer.Option("--output", "-o", help=f"Folder for results, e.g. out/bench/{name}.")
+
+
+def bench_paper(
+    models: ModelsArgument = None,
+    leaf_size: Annotated[
+        list[int] | None,
+        typer.Option("--leaf-size", "-K", min=1, help="A leaf size; may be given several times."),
+    ] = None,
+    frames: FramesOption = 24,
+    repeats: RepeatsOption = 7,
+    output: Annotated[Path, _output_option("paper")] = Path("out/bench/paper"),
+    draw: PlotsOption = True,
+    json_output: JsonOption = False,
+) -> None:
+    """Repeat the paper's evaluation: update, traversal and polygon tests over the leaf size K.
+
+    Writes results.json, paper.csv, report.md and plots.
+
+    Example: palpate bench paper
+
+    Example: palpate bench paper scene.bml -K 1 -K 5 -K 20 --output results
+    """
+    opened = _prepare(models, draw=draw)
+    sizes = sorted(set(leaf_size)) if leaf_size else list(paper.LEAF_SIZES)
+    total = paper.rounds(len(opened), sizes, repeats)
+    with progress(total, quiet=json_output) as advance:
+        cases = paper.run(
+            opened,
+            output,
+            leaf_sizes=sizes,
+            frames=frames,
+            repeats=repeats,
+            plots=draw,
+            advance=advance,
+        )
+    rows: list[dict[str, Any]] = [
+        {
+            "model": case.name,
+            "best_leaf_size": case.best.leaf_size,
+            "nodes": case.best.nodes,
+            "total": case.best.times["total"][1],
+            "wide": case.wide["total"][1],
+        }
+        for case in cases
+    ]
+    if json_output:
+        print_json({"output": str(output), "cases": rows})
+        return
+    console().print(
+        table(
+            "Best leaf size of the paper's method, and the wide method",
+            "model<|K|tree nodes P|total [ms]|wide [ms]",
+            [
+                (
+                    row["model"],
+                    row["best_leaf_size"],
+                    whole(row["nodes"]),
+                    milliseconds(row["total"]),
+                    milliseconds(row["wide"]),
+                )
+                for row in rows
+            ],
+        )
+    )
+    _tell(output)
+
+
+def bench_scaling(
+    models: ModelsArgument = None,
+    divisions: Annotated[
+        list[int] | None,
+        typer.Option("--divisions", "-n", min=1, help="Parts of each edge; may be repeated."),
+    ] = None,
+    threads: Annotated[
+        list[int] | None, typer.Option(min=1, help="Worker threads; may be repeated.")
+    ] = None,
+    frames: FramesOption = 12,
+    repeats: RepeatsOption = 5,
+    bearable: Annotated[
+        float, typer.Option(min=0, help="Longest frame [s]; slower methods are left out.")
+    ] = 0.5,
+    output: Annotated[Path, _output_option("scaling")] = Path("out/bench/scaling"),
+    draw: PlotsOption = True,
+    json_output: JsonOption = False,
+) -> None:
+    """Refine the models to 200,000 nodes and measure how the time of a frame grows.
+
+    Writes results.json, scaling.csv, report.md and a plot.
+
+    Example: palpate bench scaling
+
+    Example: palpate bench scaling scene.bml -n 1 -n 2 --threads 1 --threads 4
+    """
+    opened = _prepare(models, draw=draw)
+    parts = sorted(set(divisions or (1, 2, 3)))
+    with progress(len(opened) * len(parts), quiet=json_output) as advance:
+        results = scaling.run(
+            opened,
+            output,
+            divisions=parts,
+            threads=sorted(set(threads or (1, 2))),
+            frames=frames,
+            repeats=repeats,
+            bearable=bearable,
+            drawn=draw,
+            advance=advance,
+        )
+    if json_output:
+        rows = [
+            {
+                "model": each.model,
+                "triangles": each.triangles,
+                "query": each.query,
+                "contender": each.contender,
+                "wall": each.wall,
+            }
+            for each in results
+        ]
+        print_json({"output": str(output), "measurements": rows})
+        return
+    console().print(
+        table(
+            "Time of a frame",
+            "model<|triangles|query<|contender<|ms",
+            [
+                (
+                    each.model,
+                    whole(each.triangles),
+                    each.query,
+                    each.contender,
+                    milliseconds(each.wall),
+                )
+                for each in results
+            ],
+        )
+    )
+    _tell(output)
+
+
+def bench_peers(
+    models: ModelsArgument = None,
+    peer: Annotated[
+        list[str] | None,
+        typer.Option(
+            help=f"Only this library; may be repeated. One of: {', '.join(compare.PEERS)}."
+        ),
+    ] = None,
+    frames: FramesOption = 24,
+    repeats: RepeatsOption = 7,
+    output: Annotated[Path, _output_option("peers")] = Path("out/bench/peers"),
+    draw: PlotsOption = True,
+    json_output: JsonOption = False,
+) -> None:
+    """Measure palpate beside other libraries and compare their answers, pair by pair.
+
+    What is missing is named, with how to get it: pip install 'palpate[peers]' for the Python
+    packages; parry3d and Embree need a checkout and cargo. Writes results.json, peers.csv,
+    report.md and a plot.
+
+    Example: palpate bench peers
+
+    Example: palpate bench peers scene.bml --peer palpate --peer parry3d
+    """
+    chosen = peer or list(compare.PEERS)
+    unknown = [name for name in chosen if name not in compare.PEERS]
+    if unknown:
+        known = ", ".join(compare.PEERS)
+        raise typer.BadParameter(f"no peer {unknown[0]}; expected one of {known}")
+    opened = _prepare(models, draw=draw)
+    with progress(len(opened) * len(chosen) * (repeats + 1), quiet=json_output) as advance:
+        outcomes, missing = compare.run(
+            opened,
+            output,
+            peers=chosen,
+            frames=frames,
+            repeats=repeats,
+            drawn=draw,
+            advance=advance,
+        )
+    if json_output:
+        rows = [
+            {
+                "model": each.model,
+                "query": each.query,
+                "contender": each.contender,
+                "wall": each.wall,
+                "answer": each.answer,
+            }
+            for each in outcomes
+        ]
+        print_json({"output": str(output), "outcomes": rows, "missing": missing})
+        return
+    console().print(
+        table(
+            "Time of a frame",
+            "model<|contender<|ms|answer<",
+            [
+                (each.model, each.contender, milliseconds(each.wall), each.answer)
+                for each in sorted(outcomes, key=lambda each: (each.model, each.wall))
+            ],
+        )
+    )
+    for name, how in missing.items():
+        console().print(Text(f"missing: {name}: {how}"))
+    _tell(output)
+
+
+def _prepare(models: list[str] | None, *, draw: bool) -> list[tuple[str, Model]]:
+    """Open the models, and find out what is missing before anything is measured."""
+    if draw:
+        plots.require()
+    return [(Path(name).stem, open_model(name)[0]) for name in models or _DEFAULT_MODELS]
+
+
+def _tell(output: Path) -> None:
+    console().print(Text(f"report: {output / 'report.md'}"))
+
+
+@contextmanager
+def progress(total: int, *, quiet: bool) -> Iterator[Callable[[], None]]:
+    """A function that moves a bar on a terminal and does nothing elsewhere."""
+    if quiet or not sys.stderr.isatty():
+        yield lambda: None
+        return
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeRemainingColumn
+
+    columns = (BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=console(error=True), transient=True) as bar:
+        task = bar.add_task("", total=total)
+        yield lambda: bar.advance(task)
+
+
+for _name, _command in (
+    ("paper", bench_paper),
+    ("scaling", bench_scaling),
+    ("peers", bench_peers),
+):
+    bench_app.command(_name)(reporting(_command))
