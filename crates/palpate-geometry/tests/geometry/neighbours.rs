@@ -8,7 +8,7 @@ use palpate_geometry::{
 use proptest::prelude::*;
 
 use crate::{
-    integers::{Vector, cross, dot, integer_points, sub},
+    integers::{Vector, cross, dot, integer_points},
     oracle::hull_holds_zero,
     strategies::{floats, for_all, grid, perturbed_grid, scaled_grid},
 };
