@@ -32,10 +32,11 @@ impl LeftOut {
     fn random(meshes: &[Arc<Mesh>], random: &mut Random) -> Self {
         let mut left_out = Self::default();
         for a in 0..meshes.len() {
-            left_out
-                .ignored
-                .extend((a..meshes.len()).map(|b| [b, a]).filter(|_| random.bits() % 4 == 0));
-            let count = if random.bits() % 4 == 0 { 0 } else { meshes[a].triangles().len() };
+            left_out.ignored.extend(
+                (a..meshes.len()).map(|b| [b, a]).filter(|_| random.bits().is_multiple_of(4)),
+            );
+            let count =
+                if random.bits().is_multiple_of(4) { 0 } else { meshes[a].triangles().len() };
             let group = |random: &mut Random| (random.bits() % 8).saturating_sub(4) as u32;
             left_out.groups.push((0..count).map(|_| group(random)).collect());
         }
@@ -124,7 +125,9 @@ fn check(case: &Case, left_out: &LeftOut, distance: f64) -> [usize; 2] {
         |method| scene(&case.meshes, SceneOptions { method, leaf_size: 3, ..Default::default() });
     let mut slow = of(Method::AllPairs);
     let mut scenes = Method::ALL.map(of);
-    scenes.iter_mut().for_each(|scene| left_out.apply(scene));
+    for scene in &mut scenes {
+        left_out.apply(scene);
+    }
     let at_rest = ProximityOptions { close_at_rest: false };
     let (mut kept, mut thinned) = (0, 0);
     for frame in &case.frames {
@@ -211,7 +214,8 @@ fn it_stays_left_out_while_bodies_come_and_go() {
 fn a_sheet_at_rest_is_close_to_itself_and_folded_it_is_new() {
     let flat = sheet(6, 2, |p| p);
     for method in Method::ALL {
-        let mut scene = scene(&[flat.clone()], SceneOptions { method, ..Default::default() });
+        let mut scene =
+            scene(std::slice::from_ref(&flat), SceneOptions { method, ..Default::default() });
         let new = ProximityOptions { close_at_rest: false };
         let distance = |_: usize, _: usize| Some(1.1);
         let all = scene.proximity(&distance).pairs.len();
