@@ -6,29 +6,36 @@ use palpate_geometry::{
 
 use crate::scene::SceneBody;
 
+/// Corners of a triangle, those in a set (bits 0 to 2) first.
+const FIRST: [[usize; 3]; 8] =
+    [[0, 1, 2], [0, 1, 2], [1, 2, 0], [0, 1, 2], [2, 0, 1], [2, 0, 1], [1, 2, 0], [0, 1, 2]];
+
 /// Whether two triangles of one body meet outside the nodes and the edge that they share. Those with
 /// the same three nodes always do.
-pub(crate) fn neighbours_meet(body: &SceneBody, triangles: [u32; 2]) -> bool {
-    let corners = triangles.map(|triangle| body.mesh.triangles()[triangle as usize]);
-    let at = |node: u32| -> Point { body.positions[node as usize] };
-    let [a, b] = corners;
-    // Of each: the shared nodes first.
-    let [a, b] = [shared_first(a, b), shared_first(b, a)];
-    let edge = || [at(a.nodes[0]), at(a.nodes[1])];
-    match a.shared {
-        0 => triangles_intersect(&a.nodes.map(at), &b.nodes.map(at)),
-        1 => triangles_intersect_beyond_node(&a.nodes.map(at), &b.nodes.map(at)),
-        2 => triangles_intersect_beyond_edge(&edge(), at(a.nodes[2]), at(b.nodes[2])),
+pub(crate) fn neighbours_meet(body: &SceneBody, [a, b]: [u32; 2]) -> bool {
+    let (nodes_a, nodes_b) = (body.mesh.triangles()[a as usize], body.mesh.triangles()[b as usize]);
+    let shared = shared_corners(nodes_a, nodes_b);
+    let a = shared_first(body, nodes_a, shared);
+    let b = shared_first(body, nodes_b, shared_corners(nodes_b, nodes_a));
+    match shared.count_ones() {
+        0 => triangles_intersect(&a, &b),
+        1 => triangles_intersect_beyond_node(&a, &b),
+        2 => triangles_intersect_beyond_edge(&[a[0], a[1]], a[2], b[2]),
         _ => true,
     }
 }
 
-struct SharedFirst {
-    nodes: [u32; 3],
-    shared: usize,
+/// The corners of a triangle that are also another's: bits 0 to 2.
+fn shared_corners(nodes: [u32; 3], other: [u32; 3]) -> u32 {
+    let is_shared = |corner: usize| {
+        let node = nodes[corner];
+        u32::from((node == other[0]) | (node == other[1]) | (node == other[2])) << corner
+    };
+    is_shared(0) | is_shared(1) | is_shared(2)
 }
 
-fn shared_first(mut nodes: [u32; 3], other: [u32; 3]) -> SharedFirst {
-    nodes.sort_unstable_by_key(|node| (!other.contains(node), *node));
-    SharedFirst { nodes, shared: nodes.iter().filter(|node| other.contains(node)).count() }
+fn shared_first(body: &SceneBody, nodes: [u32; 3], shared: u32) -> [Point; 3] {
+    let [first, second, third] = FIRST[shared as usize];
+    let at = |corner: usize| body.positions[nodes[corner] as usize];
+    [at(first), at(second), at(third)]
 }

@@ -71,6 +71,14 @@ impl<'a> Plane<'a> {
         Self { triangle, normal, magnitude }
     }
 
+    /// Whether the normals of two planes are more than a right angle apart, where that is certain.
+    #[inline]
+    pub(crate) fn is_certainly_opposed(&self, other: &Plane) -> bool {
+        // Each normal is off by 4u of its magnitude, and their product adds 3u: 11u, here 20u.
+        let bound = 2.0 * FILTER * vec3::dot(self.magnitude, other.magnitude) + f64::MIN_POSITIVE;
+        certain_sign(vec3::dot(self.normal, other.normal), bound) == Some(-1)
+    }
+
     /// `orient3d` of the triangle and `point`.
     #[inline]
     pub(crate) fn side(&self, point: Point) -> i8 {
@@ -83,6 +91,16 @@ impl<'a> Plane<'a> {
             orient3d_exact(a, b, c, point)
         })
     }
+}
+
+/// The sign of `axis · (point - origin)` where rounding cannot change it.
+#[inline]
+pub(crate) fn certain_side(axis: Point, origin: Point, point: Point) -> Option<i8> {
+    let offset = vec3::sub(point, origin);
+    let terms = [axis[0] * offset[0], axis[1] * offset[1], axis[2] * offset[2]];
+    // A difference, a product and two sums: 4u.
+    let bound = FILTER * (terms[0].abs() + terms[1].abs() + terms[2].abs()) + f64::MIN_POSITIVE;
+    certain_sign(terms[0] + terms[1] + terms[2], bound)
 }
 
 /// The sign of `value`, where an error of `bound` cannot change it.

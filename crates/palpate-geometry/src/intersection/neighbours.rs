@@ -2,13 +2,20 @@
 //! first between neighbours, whose common node or edge alone says nothing.
 
 use super::{planar, segment_triangle_intersect};
-use crate::{Point, predicates::orient2d, predicates::orient3d};
+use crate::{
+    Point,
+    predicates::{Plane, certain_side, orient2d, orient3d},
+    vec3,
+};
 
 /// Exactly whether two closed triangles with the same first corner share any other point.
 ///
 /// Either may be degenerate. The order of the other two corners does not matter. Coordinates are
 /// finite.
 pub fn triangles_intersect_beyond_node(a: &[Point; 3], b: &[Point; 3]) -> bool {
+    if cones_are_apart(a, b) {
+        return false;
+    }
     // A ray from the common corner through another common point leaves one of the triangles first,
     // through its far side, and is there still inside the other.
     far_side_meets(a, b) || far_side_meets(b, a)
@@ -20,7 +27,10 @@ pub fn triangles_intersect_beyond_node(a: &[Point; 3], b: &[Point; 3]) -> bool {
 /// Either may be degenerate, and the edge a point. Coordinates are finite.
 pub fn triangles_intersect_beyond_edge(edge: &[Point; 2], a: Point, b: Point) -> bool {
     let [v, w] = *edge;
-    if orient3d(v, w, a, b) != 0 {
+    // Most are on different sides of the edge.
+    let (triangle_a, triangle_b) = ([v, w, a], [v, w, b]);
+    let plane = Plane::new(&triangle_a);
+    if plane.is_certainly_opposed(&Plane::new(&triangle_b)) || plane.side(b) != 0 {
         return false;
     }
     match (planar::projection_axis(&[v, w, a]), planar::projection_axis(&[v, w, b])) {
@@ -32,6 +42,26 @@ pub fn triangles_intersect_beyond_edge(edge: &[Point; 2], a: Point, b: Point) ->
         // The one with an area has no more of the other's line than the edge.
         _ => false,
     }
+}
+
+/// Whether a plane through the common first corner shows that nothing else is common; most neighbours
+/// pass.
+#[inline]
+fn cones_are_apart(a: &[Point; 3], b: &[Point; 3]) -> bool {
+    let v = a[0];
+    // About from the one to the other: any axis is right, if they lie on different sides of it.
+    let axis = vec3::sub(vec3::add(b[1], b[2]), vec3::add(a[1], a[2]));
+    let is_on = |side: i8, point: Point| certain_side(axis, v, point) == Some(side);
+    if is_on(-1, a[1]) & is_on(-1, a[2]) & is_on(1, b[1]) & is_on(1, b[2]) {
+        return true;
+    }
+    // Or a triangle has no more than the corner in the other's plane.
+    let only_corner = |triangle: &[Point; 3], [_, second, third]: &[Point; 3]| {
+        let plane = Plane::new(triangle);
+        let side = plane.side(*second);
+        side != 0 && side == plane.side(*third)
+    };
+    only_corner(a, b) || only_corner(b, a)
 }
 
 /// Whether the side of `triangle` opposite its first corner meets `other`, which has the same one.
