@@ -4,7 +4,7 @@
 use super::{planar, segment_triangle_intersect};
 use crate::{
     Point,
-    predicates::{Plane, certain_side, orient2d, orient3d},
+    predicates::{Plane, certain_side, orient2d},
     vec3,
 };
 
