@@ -12,7 +12,7 @@ import palpate
 from palpate.bench import compare, machine, measure, motion, paper, scaling
 from palpate.bench.fit import TERMS, fit_cost_model, fit_line
 from palpate.bench.peers import native
-from palpate.bench.peers.contender import Answer, Contender, Setting, distinct
+from palpate.bench.peers.contender import Answer, Contender, Query, Setting, distinct
 from palpate.bench.refine import refine, subdivision
 from palpate.bench.tune import tune
 from palpate.cli import app
@@ -114,8 +114,13 @@ def test_scaling_measures_every_size_and_names_what_it_leaves_out(tmp_path):
     tray = 2700
     assert second[0]["triangles"] - tray == 4 * (first[0]["triangles"] - tray)
     assert all(increasing(each["times"]["wall"]) for each in results["measurements"])
-    pairs = {each["pairs"] for each in second if each["contender"] != scaling.FLOOR}
-    assert len(pairs) == 1, "every method finds as many pairs"
+    for query in ("intersections", "proximity"):
+        pairs = {
+            each["pairs"]
+            for each in second
+            if each["query"] == query and each["contender"] != scaling.FLOOR
+        }
+        assert len(pairs) == 1, f"every method finds as many pairs: {query}"
     assert any("all-pairs" in each for each in results["left_out"])
     assert results["parallel_gain"] > 0
     assert len(rows(tmp_path / "scaling.csv")) == len(results["measurements"])
@@ -142,11 +147,12 @@ def test_peers_compares_answers_and_names_what_is_missing(tmp_path, monkeypatch)
     told = json.loads(run("bench", "peers", "small", *TINY, "-o", tmp_path))
     assert set(told["missing"]) == set(compare.PEERS) - {"palpate"}
     assert told["missing"]["coal"] == "pip install coal"
-    assert len(told["outcomes"]) == 3
+    assert len(told["outcomes"]) == 6
+    assert {each["query"] for each in told["outcomes"]} == {"intersections", "proximity"}
     assert all(each["answer"].startswith("identical") for each in told["outcomes"])
     report = (tmp_path / "report.md").read_text()
     assert all(name in report for name in told["missing"])
-    assert len(rows(tmp_path / "peers.csv")) == 3
+    assert len(rows(tmp_path / "peers.csv")) == 6
     assert json.loads((tmp_path / "results.json").read_text())["missing"] == told["missing"]
     assert (tmp_path / "peers.png").exists()
 
@@ -163,7 +169,7 @@ def test_a_wrong_answer_is_told(small):
     assert count > 2
 
     def contender(answer, found):
-        return Contender("c", answer, "", lambda: {}, found)
+        return Contender("c", Query.INTERSECTIONS, answer, "", lambda: {}, found)
 
     right = contender(Answer.PAIRS, lambda frame: truth[frame])
     assert setting.check(right) == f"identical ({count} pairs)"
@@ -177,6 +183,25 @@ def test_a_wrong_answer_is_told(small):
     assert "contain every pair" in setting.check(wide)
     narrow = contender(Answer.CANDIDATES, lambda frame: truth[frame][1:])
     assert "miss " in setting.check(narrow)
+
+
+def test_closest_features_are_those_that_bear_weight(small):
+    setting = Setting("small", small, 2)
+    scene = palpate.Scene(small)
+    checked = 0
+    for frame, features in enumerate(setting.near_features):
+        scene.update(setting.frames[frame])
+        near = scene.proximity(setting.distance)
+        expected = set()
+        for bodies, nodes, weights in zip(near.bodies, near.nodes, near.weights, strict=True):
+            sides = []
+            for body, sign in zip(bodies, (1, -1), strict=True):
+                mine = sorted(nodes[sign * weights > 0] + setting.node_offsets[body], reverse=True)
+                sides.append((*mine, -1, -1, -1)[:3])
+            expected.add((*min(sides), *max(sides)))
+        assert set(map(tuple, features.tolist())) == expected
+        checked += len(expected)
+    assert checked > 0
 
 
 def test_tune_ranks_every_choice(small):

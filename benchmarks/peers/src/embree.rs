@@ -1,5 +1,5 @@
-//! Embree's `rtcCollide` over user geometries, one per body: boxes in single precision rounded outward,
-//! the exact test on its candidates. Embree is a C library, loaded when this program starts; the
+//! Embree's `rtcCollide` over user geometries, one per body: boxes in single precision rounded outward.
+//! Embree is a C library, loaded when this program starts; the
 //! declarations below are those of `embree4/rtcore.h`.
 
 use std::error::Error;
@@ -7,7 +7,6 @@ use std::ffi::{c_char, c_int, c_uint, c_void};
 
 use libloading::Library;
 
-use crate::Contender;
 use crate::scene::{Frame, Pair, Scene};
 
 type Handle = *mut c_void;
@@ -56,7 +55,6 @@ pub struct Embree {
     geometries: Vec<Handle>,
     /// Boxes of every body, which Embree reads through `bounds_of`; the inner vectors never move.
     boxes: Vec<Vec<Bounds>>,
-    candidates: Vec<Pair>,
 }
 
 struct Functions {
@@ -105,7 +103,7 @@ impl Embree {
             set_flags(handle, SCENE_FLAG_DYNAMIC);
             set_scene_quality(handle, BUILD_QUALITY_MEDIUM);
             let mut boxes: Vec<Vec<Bounds>> = (0..scene.triangles.len())
-                .map(|body| boxes(scene, &scene.frames[0], body as u32).collect())
+                .map(|body| boxes(scene, &scene.frames[0], body as u32, 0.0).collect())
                 .collect();
             let mut geometries = Vec::new();
             for (body, boxes) in boxes.iter_mut().enumerate() {
@@ -125,15 +123,15 @@ impl Embree {
                 geometries.push(geometry);
             }
             (functions.commit_scene)(handle);
-            Ok(Self { functions, scene: handle, geometries, boxes, candidates: Vec::new() })
+            Ok(Self { functions, scene: handle, geometries, boxes })
         }
     }
 }
 
-impl Contender for Embree {
-    fn update(&mut self, scene: &Scene, frame: &Frame) {
+impl Embree {
+    pub fn update(&mut self, scene: &Scene, frame: &Frame, margin: f64) {
         for (body, kept) in self.boxes.iter_mut().enumerate() {
-            for (kept, new) in kept.iter_mut().zip(boxes(scene, frame, body as u32)) {
+            for (kept, new) in kept.iter_mut().zip(boxes(scene, frame, body as u32, margin)) {
                 *kept = new;
             }
         }
@@ -146,15 +144,13 @@ impl Contender for Embree {
         }
     }
 
-    fn intersections(&mut self, scene: &Scene, frame: &Frame, found: &mut Vec<Pair>) {
-        self.candidates.clear();
-        let candidates: *mut Vec<Pair> = &raw mut self.candidates;
-        // SAFETY: the device has one thread, so `collect` is the only user of `candidates` meanwhile.
+    pub fn candidates<F: FnMut(Pair)>(&mut self, mut visit: F) {
+        let user = (&raw mut visit).cast();
+        // SAFETY: `visit` outlives the call, and the device has one thread, so that `collect` is the
+        // only user of it meanwhile.
         unsafe {
-            (self.functions.collide)(self.scene, self.scene, collect, candidates.cast());
+            (self.functions.collide)(self.scene, self.scene, collect::<F>, user);
         }
-        let meets = |&&pair: &&Pair| !scene.are_neighbours(pair) && scene.meet(frame, pair);
-        found.extend(self.candidates.iter().filter(meets));
     }
 }
 
@@ -166,27 +162,32 @@ unsafe extern "C" fn bounds_of(arguments: *const BoundsArguments) {
     }
 }
 
-/// SAFETY: called by Embree with the vector given in `intersections` and `count` collisions.
-unsafe extern "C" fn collect(user: *mut c_void, collisions: *const Collision, count: usize) {
-    let (candidates, collisions) =
-        unsafe { (&mut *user.cast::<Vec<Pair>>(), std::slice::from_raw_parts(collisions, count)) };
+/// SAFETY: called by Embree with the closure given in `candidates` and `count` collisions.
+unsafe extern "C" fn collect<F: FnMut(Pair)>(
+    user: *mut c_void,
+    collisions: *const Collision,
+    count: usize,
+) {
+    let (visit, collisions) =
+        unsafe { (&mut *user.cast::<F>(), std::slice::from_raw_parts(collisions, count)) };
     for each in collisions {
         let pair = [each.geometry_a, each.primitive_a, each.geometry_b, each.primitive_b];
         // The scene against itself gives every pair twice.
         if pair[..2] < pair[2..] {
-            candidates.push(pair);
+            visit(pair);
         }
     }
 }
 
-fn boxes(scene: &Scene, frame: &Frame, body: u32) -> impl Iterator<Item = Bounds> {
+fn boxes(scene: &Scene, frame: &Frame, body: u32, margin: f64) -> impl Iterator<Item = Bounds> {
     (0..scene.triangles[body as usize].len() as u32).map(move |triangle| {
         let [min, max] = scene.bounds(frame, body, triangle);
         let below = |value: f64| {
             let near = value as f32;
             if f64::from(near) > value { near.next_down() } else { near }
         };
-        let [lower, upper] = [min.map(below), max.map(|value| -below(-value))];
+        let lower = min.map(|value| below(value - margin));
+        let upper = max.map(|value| -below(-value - margin));
         let padded = |[x, y, z]: [f32; 3]| [x, y, z, 0.0];
         Bounds { lower: padded(lower), upper: padded(upper) }
     })

@@ -3,8 +3,6 @@
 use std::fs::File;
 use std::io::{self, BufReader, Read};
 
-use palpate_geometry::triangles_intersect;
-
 pub type Point = [f64; 3];
 pub type Triangle = [u32; 3];
 /// Body and triangle of both sides.
@@ -56,11 +54,6 @@ impl Scene {
     pub fn are_neighbours(&self, [body_a, a, body_b, b]: Pair) -> bool {
         let nodes = |triangle: u32| &self.triangles[body_a as usize][triangle as usize];
         body_a == body_b && nodes(a).iter().any(|node| nodes(b).contains(node))
-    }
-
-    /// Whether two triangles meet, decided exactly, by the same test as palpate's.
-    pub fn meet(&self, frame: &Frame, [body_a, a, body_b, b]: Pair) -> bool {
-        triangles_intersect(&self.corners(frame, body_a, a), &self.corners(frame, body_b, b))
     }
 }
 

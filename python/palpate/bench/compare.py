@@ -21,7 +21,7 @@ from palpate.bench.output import (
     write_text,
 )
 from palpate.bench.peers import fcl, ipc, libigl, native, ours
-from palpate.bench.peers.contender import Contender, MissingError, Setting
+from palpate.bench.peers.contender import Answer, Contender, MissingError, Query, Setting
 from palpate.model import Model
 
 #: What makes the contenders of each library, by its name.
@@ -82,7 +82,9 @@ def run(
                 {
                     "model": name,
                     "triangles": len(setting.triangles),
-                    "pairs": float(np.mean([len(pairs) for pairs in setting.true_pairs])),
+                    "intersections": float(np.mean([len(pairs) for pairs in setting.true_pairs])),
+                    "proximity": float(np.mean([len(pairs) for pairs in setting.near_pairs])),
+                    "distance": setting.distance,
                 }
             )
     folder.mkdir(parents=True, exist_ok=True)
@@ -130,20 +132,19 @@ def _measure(
             contenders += PEERS[peer](setting)
         except MissingError as error:
             missing[peer] = str(error)
-    timed = measure.measure({each.name: each.run for each in contenders}, repeats, advance)
+    keyed = {f"{each.query.value}: {each.name}": each for each in contenders}
+    timed = measure.measure({key: each.run for key, each in keyed.items()}, repeats, advance)
     return [
         Outcome(
             model=setting.name,
-            query="intersections",
+            query=each.query.value,
             contender=each.name,
             finds=each.answer.value,
             how=each.how,
             answer=setting.check(each),
-            times={
-                stage: measure.spread(times).as_list() for stage, times in timed[each.name].items()
-            },
+            times={stage: measure.spread(times).as_list() for stage, times in timed[key].items()},
         )
-        for each in contenders
+        for key, each in keyed.items()
     ], missing
 
 
@@ -164,8 +165,12 @@ def _flat(each: Outcome) -> dict[str, Any]:
 def _draw(outcomes: Sequence[Outcome], path: Path) -> None:
     groups = list(dict.fromkeys((each.model, each.query) for each in outcomes))
     most = max(sum((each.model, each.query) == group for each in outcomes) for group in groups)
-    made, axes = plots.figure(1, len(groups), width=6.2, height=0.6 + 0.33 * most)
-    for one, group in zip(axes[0], groups, strict=True):
+    columns = 2 if len(groups) > 1 else 1
+    lines = -(-len(groups) // columns)
+    made, axes = plots.figure(lines, columns, width=6.2, height=0.9 + 0.28 * most)
+    for one in list(axes.flat)[len(groups) :]:
+        one.set_visible(False)
+    for one, group in zip(axes.flat, groups, strict=False):
         shown = sorted(
             (each for each in outcomes if (each.model, each.query) == group),
             key=lambda each: -each.wall,
@@ -183,11 +188,8 @@ def _draw(outcomes: Sequence[Outcome], path: Path) -> None:
             height=0.62,
             error_kw={"elinewidth": 1, "ecolor": plots.INK},
         )
-        names = [
-            each.contender
-            + {"candidates only": " *", "pairs of different bodies": " †"}.get(each.finds, "")
-            for each in shown
-        ]
+        marks = {Answer.CANDIDATES.value: " *", Answer.INTER_PAIRS.value: " †"}
+        names = [each.contender + marks.get(each.finds, "") for each in shown]
         one.set_yticks(range(len(shown)), names, fontsize=7.5)
         for index, value in enumerate(median):
             one.annotate(
@@ -199,9 +201,7 @@ def _draw(outcomes: Sequence[Outcome], path: Path) -> None:
                 fontsize=7,
                 color=plots.INK,
             )
-        plots.label(
-            one, f"{group[0]}: {group[1]}", "ms per frame (* candidates, † other bodies)", ""
-        )
+        plots.label(one, f"{group[0]}: {group[1]}", "ms per frame", "")
         plots.logarithmic(one, "x")
         one.set_xlim(right=float(high.max()) * 3)
         one.grid(visible=False, axis="y")
@@ -230,38 +230,16 @@ def _report(
     )
     if drawn:
         yield "![Time per frame of every library](peers.png)"
+        yield "\\* candidates only; † only pairs of different bodies."
     for scene in scenes:
-        name = scene["model"]
-        yield f"## {name}"
-        yield (
-            f"{whole(scene['triangles'])} surface triangles, {whole(scene['pairs'])} pairs meet in "
-            f"the mean frame."
-        )
-        shown = sorted(
-            (each for each in outcomes if each.model == name), key=lambda each: each.wall
-        )
-        fastest = next(
-            (each.wall for each in shown if each.contender.startswith("palpate")), shown[0].wall
-        )
-        yield markdown_table(
-            "contender<|update [ms]|frame [ms]|quartiles|times ours|finds<|answer<",
-            [
-                [
-                    each.contender,
-                    milliseconds(each.times["update"][1]) if "update" in each.times else "-",
-                    milliseconds(each.wall),
-                    " to ".join(milliseconds(each.times["wall"][quartile]) for quartile in (0, 2)),
-                    f"{each.wall / fastest:.1f}",
-                    each.finds,
-                    each.answer,
-                ]
-                for each in shown
-            ],
-        )
+        for query in Query:
+            yield from _table(outcomes, scene, query)
     yield "## How each is used"
     yield "\n".join(
-        f"- **{name}**: {how}."
-        for name, how in dict.fromkeys((each.contender, each.how) for each in outcomes)
+        f"- **{name}** ({query}): {how}."
+        for name, query, how in dict.fromkeys(
+            (each.contender, each.query, each.how) for each in outcomes
+        )
     )
     yield (
         "Answers are compared as complete lists in every frame. Two triangles of one body that "
@@ -273,3 +251,41 @@ def _report(
     if missing:
         yield "## Missing here"
         yield "\n".join(f"- {name}: {how}" for name, how in missing.items())
+
+
+def _table(outcomes: Sequence[Outcome], scene: Mapping[str, Any], query: Query) -> Iterator[str]:
+    name = scene["model"]
+    shown = sorted(
+        (each for each in outcomes if (each.model, each.query) == (name, query.value)),
+        key=lambda each: each.wall,
+    )
+    if not shown:
+        return
+    yield f"## {name}: {query.value}"
+    if query is Query.INTERSECTIONS:
+        yield (
+            f"{whole(scene['triangles'])} surface triangles; {whole(scene['intersections'])} pairs "
+            f"meet in the mean frame."
+        )
+    else:
+        yield (
+            f"Vertex-triangle and edge-edge pairs closer than {scene['distance'] * 1e3:.3g} mm, "
+            f"1e-3 of the scene's diagonal: {whole(scene['proximity'])} in the mean frame."
+        )
+    ours_wall = [each.wall for each in shown if each.contender.startswith("palpate")]
+    fastest = min(ours_wall, default=shown[0].wall)
+    yield markdown_table(
+        "contender<|update [ms]|frame [ms]|quartiles|times ours|finds<|answer<",
+        [
+            [
+                each.contender,
+                milliseconds(each.times["update"][1]) if "update" in each.times else "-",
+                milliseconds(each.wall),
+                " to ".join(milliseconds(each.times["wall"][quartile]) for quartile in (0, 2)),
+                f"{each.wall / fastest:.1f}",
+                each.finds,
+                each.answer,
+            ]
+            for each in shown
+        ],
+    )

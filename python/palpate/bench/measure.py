@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from palpate._arrays import Float64Array
-from palpate.contacts import DetectionStats, Intersections
+from palpate.contacts import DetectionStats, Intersections, Proximity
 from palpate.scene import Scene
 
 #: Seconds per stage and frame of one pass over the motion.
@@ -82,17 +82,31 @@ def _no_garbage_collection() -> Iterator[None]:
             gc.enable()
 
 
+#: Asks a scene for what meets or is close.
+Find = Callable[[Scene], Intersections | Proximity]
+
+
+def meeting(**options: Any) -> Find:
+    """Ask for `Scene.intersections`."""
+    return lambda scene: scene.intersections(**options)
+
+
+def within(distance: float) -> Find:
+    """Ask for `Scene.proximity`."""
+    return lambda scene: scene.proximity(distance)
+
+
 def scene_pass(
-    scene: Scene, frames: Sequence[Any], **options: Any
+    scene: Scene, frames: Sequence[Any], find: Find
 ) -> Callable[[], dict[str, list[float]]]:
-    """One pass of a scene over the motion: update and find what meets in every frame."""
+    """One pass of a scene over the motion: update and ask in every frame."""
 
     def run() -> dict[str, list[float]]:
         times: dict[str, list[float]] = {stage: [] for stage in STAGES}
         for frame in frames:
             start = time.perf_counter()
             scene.update(frame)
-            stats = scene.intersections(**options).stats
+            stats = find(scene).stats
             wall = time.perf_counter() - start
             stages = (
                 scene.update_time,
@@ -107,16 +121,16 @@ def scene_pass(
     return run
 
 
-def count_pass(scene: Scene, frames: Sequence[Any], **options: Any) -> list[Intersections]:
+def count_pass(scene: Scene, frames: Sequence[Any], find: Find) -> list[Intersections | Proximity]:
     """What a scene finds in every frame, untimed."""
     found = []
     for frame in frames:
         scene.update(frame)
-        found.append(scene.intersections(**options))
+        found.append(find(scene))
     return found
 
 
-def mean_counts(found: Sequence[Intersections]) -> dict[str, float]:
+def mean_counts(found: Sequence[Intersections | Proximity]) -> dict[str, float]:
     """Mean over the frames of the work that finding took, and of the pairs found."""
     names = ("nodes_visited", "leaf_pairs", "box_tests", "pair_tests")
     stats: list[DetectionStats] = [each.stats for each in found]

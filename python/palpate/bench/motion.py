@@ -99,6 +99,12 @@ def _field(mesh: Mesh, middle: Float64Array, phase: float, rigid: bool) -> Field
     return Field(center, center - middle, axes, float(length), float(width), curl, phase, rigid)
 
 
+def diagonal(meshes: Sequence[Mesh]) -> float:
+    """Diagonal [m] of the box around all bodies at rest."""
+    nodes = np.concatenate([mesh.nodes for mesh in meshes])
+    return float(np.linalg.norm(np.ptp(nodes, axis=0)))
+
+
 def record(
     motion: Sequence[Field], meshes: Sequence[Mesh], frames: int
 ) -> list[list[Float64Array]]:

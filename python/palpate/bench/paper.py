@@ -133,20 +133,20 @@ def measure_case(
     recorded = motion.record(motion.fields(model), [body.mesh for body in model.bodies], frames)
     wide = Scene(model)
     # As the paper does it: polygons in one leaf are not tested against each other.
+    literal, everything = measure.meeting(same_leaf=False), measure.meeting()
     scenes = {k: Scene(model, leaf_size=k, method="paper", split="middle") for k in leaf_sizes}
     contenders = {
-        f"K={k}": measure.scene_pass(scene, recorded, same_leaf=False)
-        for k, scene in scenes.items()
+        f"K={k}": measure.scene_pass(scene, recorded, literal) for k, scene in scenes.items()
     }
-    contenders["wide"] = measure.scene_pass(wide, recorded)
+    contenders["wide"] = measure.scene_pass(wide, recorded, everything)
     times = {
         each: _spreads(stages)
         for each, stages in measure.measure(contenders, repeats, advance).items()
     }
-    complete = measure.count_pass(wide, recorded)
+    complete = measure.count_pass(wide, recorded, everything)
     rows = []
     for k, scene in scenes.items():
-        found = measure.count_pass(scene, recorded, same_leaf=False)
+        found = measure.count_pass(scene, recorded, literal)
         rows.append(
             Row(
                 leaf_size=k,

@@ -51,14 +51,16 @@ def tune(
     largest = max(len(body.mesh.triangles) for body in model.bodies)
     left = {
         (method, leaf_size, split): measure.scene_pass(
-            Scene(model, method=method, leaf_size=leaf_size, split=split, threads=threads), recorded
+            Scene(model, method=method, leaf_size=leaf_size, split=split, threads=threads),
+            recorded,
+            measure.meeting(),
         )
         for method in methods
         for leaf_size in leaf_sizes
         if leaf_size <= largest
         for split in SPLITS
     }
-    default = measure.scene_pass(Scene(model, threads=threads), recorded)
+    default = measure.scene_pass(Scene(model, threads=threads), recorded, measure.meeting())
     choices: dict[tuple[str, int, str], Choice] = {}
     passes = min(2, repeats)
     while True:

@@ -19,6 +19,7 @@ from palpate.bench.peers.contender import (
     Contender,
     MissingError,
     PairArray,
+    Query,
     Setting,
     distinct,
 )
@@ -81,6 +82,7 @@ def coal(setting: Setting) -> list[Contender]:
     return [
         Contender(
             f"coal {metadata.version('coal')}",
+            Query.INTERSECTIONS,
             Answer.INTER_PAIRS,
             "OBBRSS trees, refitted; coal's own test; vertices put into its vectors beforehand",
             _passes(len(frames), update, collide),
@@ -129,6 +131,7 @@ def python_fcl(setting: Setting) -> list[Contender]:
     return [
         Contender(
             f"python-fcl {metadata.version('python-fcl')}",
+            Query.INTERSECTIONS,
             Answer.INTER_PAIRS,
             "trees built anew in every frame (the binding has no refit); FCL's own test",
             _passes(len(setting.frames), update, collide),
@@ -170,6 +173,7 @@ def trimesh_manager(setting: Setting) -> list[Contender]:
     return [
         Contender(
             f"trimesh {metadata.version('trimesh')}",
+            Query.INTERSECTIONS,
             Answer.INTER_PAIRS,
             "CollisionManager over python-fcl, made anew in every frame",
             _passes(len(setting.frames), update, collide),

@@ -13,6 +13,7 @@ from palpate.bench.peers.contender import (
     Contender,
     MissingError,
     PairArray,
+    Query,
     Setting,
     distinct,
 )
@@ -41,6 +42,7 @@ def libigl(setting: Setting) -> list[Contender]:
     return [
         Contender(
             f"libigl {metadata.version('libigl')} with CGAL",
+            Query.INTERSECTIONS,
             Answer.PAIRS,
             "remesh_self_intersections, detect only, exact; folds of neighbours not counted",
             run,

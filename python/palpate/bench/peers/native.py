@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from palpate.bench.measure import Pass
-from palpate.bench.peers.contender import Answer, Contender, MissingError, PairArray, Setting
+from palpate.bench.peers.contender import Answer, Contender, MissingError, PairArray, Query, Setting
 
 #: The program's sources, in a checkout.
 PROGRAM = Path(__file__).parents[4] / "benchmarks" / "peers"
@@ -22,27 +22,28 @@ PROGRAM = Path(__file__).parents[4] / "benchmarks" / "peers"
 def parry(setting: Setting) -> list[Contender]:
     """Parry's hierarchies with the exact test and with its own."""
     process = _Process(setting, None)
-    version = _locked_version("parry3d-f64")
+    name = f"parry3d {_locked_version('parry3d-f64')}"
+    trees = "one binary tree per body, refitted"
+    exact = f"{trees}; palpate's exact test on its candidates"
+    own = f"{trees}; parry's own test, GJK"
+    near = f"{trees}; palpate's distances on its candidates"
     return [
-        process.contender(
-            "parry",
-            f"parry3d {version}, exact test",
-            "one binary tree per body, refitted; palpate's exact test on its candidates",
-        ),
-        process.contender(
-            "parry-gjk", f"parry3d {version}, own test", "the same trees; parry's own test, GJK"
-        ),
+        process.contender("intersections parry", f"{name}, exact test", exact),
+        process.contender("intersections-gjk parry", f"{name}, own test", own),
+        process.contender("proximity parry", name, near),
     ]
 
 
 def embree(setting: Setting) -> list[Contender]:
     """Embree's rtcCollide, with the library that comes with embreex."""
     process = _Process(setting, _embree_library())
-    version = f"Embree 4 (of embreex {metadata.version('embreex')})"
-    how = "rtcCollide over user geometries; palpate's exact test on its candidates"
+    name = f"Embree 4 (of embreex {metadata.version('embreex')})"
+    exact = "rtcCollide over user geometries; palpate's exact test on its candidates"
+    near = "rtcCollide over user geometries; palpate's distances on its candidates"
     return [
-        process.contender("embree-refit", f"{version}, refitted", how),
-        process.contender("embree-rebuild", f"{version}, rebuilt", how),
+        process.contender(f"{query} embree-{update}", f"{name}, {update}", how)
+        for query, how in (("intersections", exact), ("proximity", near))
+        for update in ("refit", "rebuild")
     ]
 
 
@@ -54,11 +55,12 @@ class _Process:
         self._setting = setting
         with tempfile.NamedTemporaryFile(suffix=".scene", delete=False) as file:
             file.write(_scene_bytes(setting))
-        command = [str(program), file.name, *([str(library)] if library else [])]
+        words = [file.name, repr(setting.distance), *([str(library)] if library else [])]
+        command = [str(program), *words]
         self._process = subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
         )
-        self._pairs: dict[str, list[PairArray]] = {}
+        self._found: dict[str, list[PairArray]] = {}
         self._scene = Path(file.name)
 
     def ask(self, command: str) -> Any:
@@ -72,20 +74,27 @@ class _Process:
             raise RuntimeError(f"palpate-peers ended on {command!r}: {self._process.wait()}")
         return json.loads(line)
 
-    def contender(self, name: str, title: str, how: str) -> Contender:
-        """One of the program's contenders."""
+    def contender(self, query_and_name: str, title: str, how: str) -> Contender:
+        """One of the program's contenders, for one query."""
+        near = query_and_name.startswith("proximity")
 
         def run() -> Pass:
-            passed: dict[str, list[float]] = self.ask(f"pass {name}")
+            passed: dict[str, list[float]] = self.ask(f"pass {query_and_name}")
             return passed
 
         def found(frame: int) -> PairArray:
-            if name not in self._pairs:
-                frames = self.ask(f"pairs {name}")
-                self._pairs[name] = [self._setting.stacked(np.array(each)) for each in frames]
-            return self._pairs[name][frame]
+            if query_and_name not in self._found:
+                frames = self.ask(f"found {query_and_name}")
+                self._found[query_and_name] = [
+                    np.unique(np.array(each, dtype=np.int64).reshape(-1, 5), axis=0)
+                    if near
+                    else self._setting.stacked(np.array(each))
+                    for each in frames
+                ]
+            return self._found[query_and_name][frame]
 
-        return Contender(title, Answer.PAIRS, how, run, found)
+        query = Query.PROXIMITY if near else Query.INTERSECTIONS
+        return Contender(title, query, Answer.PAIRS, how, run, found)
 
     def __del__(self) -> None:
         if hasattr(self, "_process") and self._process.stdin is not None:
