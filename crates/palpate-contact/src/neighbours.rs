@@ -27,10 +27,7 @@ pub(crate) fn neighbours_meet(body: &SceneBody, [a, b]: [u32; 2]) -> bool {
 
 /// The corners of a triangle that are also another's: bits 0 to 2.
 fn shared_corners(nodes: [u32; 3], other: [u32; 3]) -> u32 {
-    let is_shared = |corner: usize| {
-        let node = nodes[corner];
-        u32::from((node == other[0]) | (node == other[1]) | (node == other[2])) << corner
-    };
+    let is_shared = |corner: usize| u32::from(other.contains(&nodes[corner])) << corner;
     is_shared(0) | is_shared(1) | is_shared(2)
 }
 
