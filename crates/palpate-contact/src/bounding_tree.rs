@@ -1,17 +1,14 @@
 //! The bounding tree: a binary tree of boxes over a body's tetrahedra, made once, refitted each step.
 
 mod build;
-mod closest;
 mod refit;
 mod traverse;
 mod validate;
-mod winding;
 
 use palpate_geometry::{Aabb, Point};
 use palpate_model::Mesh;
 
 pub use validate::TreeDefect;
-pub(crate) use winding::Side;
 
 /// Where a box that holds too many tetrahedra is split, along its longest axis.
 #[derive(

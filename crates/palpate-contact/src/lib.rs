@@ -30,9 +30,11 @@ pub mod bounding_tree;
 mod leaf_pairs;
 mod left_out;
 mod method;
+mod nearest;
 mod neighbours;
 pub mod pairs;
 mod penetration;
+mod points;
 mod proximity;
 pub mod scene;
 mod simd;
@@ -42,7 +44,8 @@ mod wide;
 
 pub use bounding_tree::{BoundingTree, Split, TreeDefect, TreeStats};
 pub use pairs::{PairKind, PenetratingNode, ProximityPair, TrianglePair};
+pub use points::SurfacePoint;
 pub use scene::{
-    ClosestPoint, ContactNodes, DetectionStats, IntersectionOptions, Intersections, Method,
-    Penetration, Proximity, ProximityOptions, Scene, SceneError, SceneOptions, UpdateStats,
+    ContactNodes, DetectionStats, IntersectionOptions, Intersections, Method, Penetration,
+    Proximity, ProximityOptions, Scene, SceneError, SceneOptions, UpdateStats,
 };

@@ -13,8 +13,7 @@ use rayon::ThreadPool;
 
 use crate::proximity::Limit;
 use crate::scene::{Frame, IntersectionOptions, Intersections, Proximity, SceneBody};
-
-pub(crate) use paper::meeting_triangles;
+use crate::wide::WideSurface;
 
 /// How touching surface elements are found. All give the same pairs.
 #[derive(
@@ -68,6 +67,11 @@ pub(crate) trait Detector: Debug + Send + Sync {
 
     /// A box around a body at least as large as its own; `None` where its tree must say.
     fn bounds(&self, _body: usize) -> Option<Aabb> {
+        None
+    }
+
+    /// The body in the wide layout; `None` where its tree must do.
+    fn wide_surface(&self, _body: usize) -> Option<WideSurface<'_>> {
         None
     }
 

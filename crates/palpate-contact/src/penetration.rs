@@ -1,44 +1,44 @@
-//! Surface nodes inside other bodies.
+//! Surface nodes inside other bodies, and inside their own after folding, with their way out.
 //!
-//! Only crossing triangles change the side: a part of body a's surface that does not meet body b's is
-//! wholly inside or wholly outside. So the crossing triangles are found first, the rest falls into
-//! connected parts, and one node of each is located. Bodies that do not touch cost one point each.
+//! Two bodies that cross bound the volume that they share by two patches, one of each surface: the
+//! triangles that cross or are inside. A node of one patch leaves through the other, where that faces
+//! it. So the exits of a patch do not flip to the far side of a thin body, which the closest point of the
+//! whole surface does, and no direction is guessed from where edges happen to cross, as in Heidelberger
+//! et al. 2004 (Consistent penetration depth estimation), whose aim this shares: edges of a flat surface
+//! pressed against a plate only cross the plate's rim, and their normals point sideways.
+
+mod exit;
+mod inside;
 
 use std::time::Instant;
 
-use palpate_geometry::{Point, vec3};
+use palpate_geometry::Aabb;
 
-use crate::bounding_tree::Side;
-use crate::bounding_tree::corner_points;
-use crate::leaf_pairs::{BodyPair, Cost, LeafPairSearch, for_each};
-use crate::method::meeting_triangles;
+use crate::leaf_pairs::{Cost, for_each};
+use crate::method::Detector;
+use crate::nearest::Surfaces;
 use crate::pairs::{PenetratingNode, TrianglePair};
-use crate::proximity::{any_normal, direction, size, triangle_normal, unit};
-use crate::scene::{Frame, Penetration, SceneBody};
-use crate::surface::join_nodes;
+use crate::scene::{DetectionStats, Frame, IntersectionOptions, Intersections, Penetration};
+use exit::Exits;
+use inside::Inside;
 
-/// Not yet located.
-const UNKNOWN: u8 = 0;
-const INSIDE: u8 = 1;
-const OUTSIDE: u8 = 2;
+/// Asked for (body, `into_body`), a body with itself included.
+pub(crate) type Include<'a> = &'a (dyn Fn(usize, usize) -> bool + Sync);
 
 /// Buffers of the search.
 #[derive(Debug, Default)]
 pub(crate) struct PenetrationSearch {
-    objects: Vec<(u32, u32)>,
-    crossing: LeafPairSearch<TrianglePair>,
-    crossing_pairs: Vec<TrianglePair>,
-    directed: Vec<[u32; 2]>,
+    pairs: Vec<(u32, u32)>,
+    crossing: Intersections,
     workers: Vec<Worker>,
 }
 
-/// Buffers of one ordered body pair; of all when there is one thread.
+/// Buffers of one pair of bodies; of all when there is one thread.
 #[derive(Debug, Default)]
 struct Worker {
-    directed: [u32; 2],
-    crosses: Vec<bool>,
-    parts: Vec<u32>,
-    side_of_part: Vec<u8>,
+    pairs: [usize; 2],
+    inside: [Inside; 2],
+    exits: Exits,
     found: Vec<PenetratingNode>,
     cost: Cost,
 }
@@ -47,141 +47,124 @@ impl PenetrationSearch {
     pub(crate) fn run(
         &mut self,
         frame: &Frame,
-        include: &(dyn Fn(usize, usize) -> bool + Sync),
+        detector: &mut dyn Detector,
+        include: Include,
         found: &mut Penetration,
     ) {
         let start = Instant::now();
-        found.stats.all_pairs = frame.all_pairs(false);
-        self.objects.clear();
-        self.directed.clear();
-        self.crossing.body_pairs.clear();
-        found.stats.nodes_visited += frame.upper.pairs(&mut self.objects);
-        for &(a, b) in &self.objects {
-            let before = self.directed.len();
-            for [body, into] in [[a, b], [b, a]] {
-                let closed = frame.bodies[into as usize].surface.closed;
-                if closed && include(body as usize, into as usize) {
-                    self.directed.push([body, into]);
-                }
-            }
-            if self.directed.len() > before {
-                self.crossing.body_pairs.push(BodyPair::meeting(a, b));
+        let Self { pairs, crossing, workers } = self;
+        pairs.clear();
+        let visited = frame.upper.pairs(pairs);
+        let closed = |body: u32| frame.bodies[body as usize].surface.closed;
+        let wanted = |a: u32, b: u32| {
+            !frame.is_ignored(a, b) && closed(b) && include(a as usize, b as usize)
+        };
+        pairs.retain(|&(a, b)| wanted(a, b) || wanted(b, a));
+        let between = pairs.len();
+        for body in 0..frame.bodies.len() as u32 {
+            let solid = !frame.bodies[body as usize].mesh.tetrahedra().is_empty();
+            if solid && wanted(body, body) {
+                pairs.push((body, body));
             }
         }
-        found.stats.object_time = start.elapsed();
+        let self_contact = pairs.len() > between;
+        crossing.pairs.clear();
+        crossing.stats = DetectionStats::default();
+        if !pairs.is_empty() {
+            let options = IntersectionOptions { self_contact, same_leaf: true, shared_nodes: true };
+            detector.intersections(frame, options, crossing);
+        }
+        found.stats = crossing.stats;
+        found.stats.nodes_visited += visited;
+        found.stats.all_pairs = frame.all_pairs(self_contact);
+        found.stats.object_time += start.elapsed().saturating_sub(crossing.stats.total_time());
 
-        self.crossing_pairs.clear();
-        self.crossing.run(
-            frame,
-            false,
-            &mut self.crossing_pairs,
-            &mut found.stats,
-            |pair, triangles, found, cost| {
-                found.extend(meeting_triangles(frame, pair, triangles, false, cost));
-            },
-        );
-
-        let locating = Instant::now();
-        self.crossing_pairs.sort_unstable_by_key(|pair| (pair.body_a, pair.body_b));
-        self.locate_all(frame, found);
-        found.nodes.sort_unstable_by_key(|node| (node.body, node.node, node.into_body));
-        found.stats.polygon_time += locating.elapsed();
-    }
-
-    fn locate_all(&mut self, frame: &Frame, found: &mut Penetration) {
-        let Self { crossing_pairs, directed, workers, .. } = self;
+        let start = Instant::now();
+        crossing.pairs.sort_unstable_by_key(bodies_of);
         let threaded = frame.pool.is_some();
-        let worker_count = if threaded { directed.len() } else { 1 };
-        workers.resize_with(workers.len().max(worker_count), Worker::default);
-        let workers = &mut workers[..worker_count];
-        for (index, worker) in workers.iter_mut().enumerate() {
-            let one = [index as u32, index as u32 + 1];
-            worker.directed = if threaded { one } else { [0, directed.len() as u32] };
+        let count = if threaded { pairs.len() } else { 1 };
+        workers.resize_with(workers.len().max(count), Worker::default);
+        for (index, worker) in workers[..count].iter_mut().enumerate() {
+            let one = [index, index + 1];
+            worker.pairs = if threaded { one } else { [0, pairs.len()] };
         }
-        for_each(frame.pool, workers, |worker| {
+        let surfaces = Surfaces { bodies: frame.bodies, detector };
+        let search = Search { surfaces, bounds: frame.upper.bounds(), include };
+        for_each(frame.pool, &mut workers[..count], |worker| {
             worker.found.clear();
             worker.cost = Cost::default();
-            let [first, last] = worker.directed;
-            for &[body, into] in &directed[first as usize..last as usize] {
-                let key = (body.min(into), body.max(into));
-                let of_pair = |pair: &TrianglePair| (pair.body_a, pair.body_b);
-                let start = crossing_pairs.partition_point(|pair| of_pair(pair) < key);
-                let end = crossing_pairs.partition_point(|pair| of_pair(pair) <= key);
-                worker.locate(frame.bodies, [body, into], &crossing_pairs[start..end]);
+            for &pair in &pairs[worker.pairs[0]..worker.pairs[1]] {
+                let start = crossing.pairs.partition_point(|crossing| bodies_of(crossing) < pair);
+                let end = crossing.pairs.partition_point(|crossing| bodies_of(crossing) <= pair);
+                worker.pair(&search, pair, &crossing.pairs[start..end]);
             }
         });
-        for worker in workers.iter() {
+        for worker in &workers[..count] {
             found.nodes.extend_from_slice(&worker.found);
             worker.cost.add_to(&mut found.stats);
         }
+        found.nodes.sort_unstable_by_key(|node| (node.body, node.node, node.into_body));
+        found.stats.polygon_time += start.elapsed();
     }
+}
+
+fn bodies_of(pair: &TrianglePair) -> (u32, u32) {
+    (pair.body_a, pair.body_b)
+}
+
+/// What the workers read.
+struct Search<'a> {
+    surfaces: Surfaces<'a>,
+    /// Box around all bodies.
+    bounds: Aabb,
+    include: Include<'a>,
 }
 
 impl Worker {
-    /// Finds the nodes of `body` inside `into`, given the pairs of triangles where the two cross.
-    fn locate(&mut self, bodies: &[SceneBody], [body, into]: [u32; 2], crossing: &[TrianglePair]) {
-        let (a, b) = (&bodies[body as usize], &bodies[into as usize]);
-        let parts = if crossing.is_empty() {
-            &a.surface.components
-        } else {
-            self.crosses.clear();
-            self.crosses.resize(a.mesh.triangles().len(), false);
-            for pair in crossing {
-                let triangle = if pair.body_a == body { pair.triangle_a } else { pair.triangle_b };
-                self.crosses[triangle as usize] = true;
+    /// Finds the nodes of each body inside the other, or of one within itself, given the triangles
+    /// where they cross.
+    fn pair(&mut self, search: &Search, (a, b): (u32, u32), crossing: &[TrianglePair]) {
+        let Self { inside: [inside_a, inside_b], exits, found, cost, .. } = self;
+        let surfaces = &search.surfaces;
+        let [body_a, body_b] = [a, b].map(|body| &surfaces.bodies[body as usize]);
+        if a == b {
+            if crossing.is_empty() && body_a.surface.component_nodes.len() == 1 {
+                return;
             }
-            join_nodes(&a.mesh, &mut self.parts, |triangle| !self.crosses[triangle as usize]);
-            &self.parts
+            let triangles = crossing.iter().flat_map(|pair| [pair.triangle_a, pair.triangle_b]);
+            inside_a.locate(body_a, triangles, |node| {
+                cost.polygon_tests += 1;
+                surfaces.is_covered(a, node)
+            });
+            if inside_a.is_empty() {
+                return;
+            }
+            inside_a.make_patch(body_a);
+            exits.run(search, [a, a], inside_a, Some(inside_a), found);
+            return;
+        }
+        let mut locate = |inside: &mut Inside, [body, into]: [u32; 2], of_a: bool| {
+            let body = &surfaces.bodies[body as usize];
+            let triangle =
+                |pair: &TrianglePair| if of_a { pair.triangle_a } else { pair.triangle_b };
+            inside.locate(body, crossing.iter().map(triangle), |node| {
+                cost.polygon_tests += 1;
+                surfaces.is_inside(into, &body.positions[node as usize])
+            });
         };
-        self.side_of_part.clear();
-        self.side_of_part.resize(a.mesh.nodes().len(), UNKNOWN);
-        for &node in a.mesh.surface_nodes() {
-            let point = a.positions[node as usize];
-            let side = &mut self.side_of_part[parts[node as usize] as usize];
-            if *side == UNKNOWN {
-                self.cost.polygon_tests += 1;
-                *side = if b.is_inside(&point) { INSIDE } else { OUTSIDE };
-            }
-            if *side == INSIDE {
-                self.found.extend(way_out(b, [body, into], node, point));
+        locate(inside_a, [a, b], true);
+        locate(inside_b, [b, a], false);
+        if inside_a.is_empty() && inside_b.is_empty() {
+            return;
+        }
+        inside_a.make_patch(body_a);
+        inside_b.make_patch(body_b);
+        let ways = [([a, b], &*inside_a, &*inside_b, body_a), ([b, a], inside_b, inside_a, body_b)];
+        for ([body, into], inside, other, of) in ways {
+            if !inside.is_empty() && (search.include)(body as usize, into as usize) {
+                let patch = of.surface.closed.then_some(other);
+                exits.run(search, [body, into], inside, patch, found);
             }
         }
     }
-}
-
-impl SceneBody {
-    /// Whether `point` is strictly inside; never for an open surface.
-    pub(crate) fn is_inside(&self, point: &Point) -> bool {
-        self.surface.closed && self.tree().side(&self.positions, point) == Side::Inside
-    }
-}
-
-/// The record of a node inside body `b`; `None` when the exit is where the node is.
-fn way_out(
-    b: &SceneBody,
-    [body, into_body]: [u32; 2],
-    node: u32,
-    point: Point,
-) -> Option<PenetratingNode> {
-    let exit = b.tree().closest_point(&b.positions, point, f64::INFINITY)?;
-    let depth = exit.distance_squared.sqrt();
-    if depth == 0.0 {
-        return None;
-    }
-    let corners = corner_points(&b.positions, b.mesh.triangles()[exit.triangle as usize]);
-    let mut offset = [0.0; 3];
-    for (weight, corner) in exit.weights.into_iter().zip(corners) {
-        offset = vec3::add_scaled(offset, vec3::sub(corner, point), weight);
-    }
-    Some(PenetratingNode {
-        body,
-        node,
-        into_body,
-        triangle: exit.triangle,
-        weights: exit.weights,
-        direction: direction(offset, depth, size(&corners))
-            .or_else(|| unit(triangle_normal(&corners)))
-            .unwrap_or_else(|| any_normal(vec3::sub(corners[1], corners[0]))),
-        depth,
-    })
 }

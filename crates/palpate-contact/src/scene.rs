@@ -3,20 +3,22 @@
 mod error;
 mod lazy_tree;
 mod options;
+mod points;
 mod results;
 
 use std::sync::Arc;
 use std::time::Instant;
 
-use palpate_geometry::{Aabb, Point, vec3};
+use palpate_geometry::{Aabb, Point};
 use palpate_model::{Mesh, Structure};
 use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::bounding_tree::{BoundingTree, corner_points};
-use crate::left_out::{Groups, IgnoredPairs};
+use crate::left_out::{CommonGroups, Groups, IgnoredPairs};
 use crate::method::Detector;
 use crate::penetration::PenetrationSearch;
+use crate::points::SurfacePoint;
 use crate::proximity::Limit;
 use crate::surface::Surface;
 use crate::upper_tree::UpperTree;
@@ -27,7 +29,7 @@ use lazy_tree::LazyTree;
 pub use error::SceneError;
 pub use options::{IntersectionOptions, ProximityOptions, SceneOptions};
 pub use results::{
-    ClosestPoint, ContactNodes, DetectionStats, Intersections, Penetration, Proximity, UpdateStats,
+    ContactNodes, DetectionStats, Intersections, Penetration, Proximity, UpdateStats,
 };
 
 /// One body: its mesh and what follows from it, and where its nodes are now.
@@ -66,6 +68,8 @@ pub(crate) struct Frame<'a> {
     pub(crate) bodies: &'a [SceneBody],
     pub(crate) upper: &'a UpperTree,
     pub(crate) ignored: &'a IgnoredPairs,
+    /// Whether triangles of a common group are no pair.
+    pub(crate) with_groups: bool,
     pub(crate) pool: Option<&'a ThreadPool>,
 }
 
@@ -73,6 +77,16 @@ impl Frame<'_> {
     /// Whether a body pair, in any order, is not to be tested.
     pub(crate) fn is_ignored(&self, a: u32, b: u32) -> bool {
         self.ignored.holds(a, b)
+    }
+
+    /// The groups of two bodies; `None` where none matter.
+    #[inline]
+    pub(crate) fn common_groups<'a>(
+        &self,
+        a: &'a SceneBody,
+        b: &'a SceneBody,
+    ) -> Option<CommonGroups<'a>> {
+        if self.with_groups { CommonGroups::of(a, b) } else { None }
     }
 
     /// Collects the body pairs (a <= b) whose triangles can meet; returns the upper tree's nodes visited.
@@ -121,6 +135,8 @@ pub struct Scene {
     proximity: Proximity,
     penetration: Penetration,
     contact_nodes: ContactNodes,
+    surface_points: Vec<Option<SurfacePoint>>,
+    inside: Vec<bool>,
 }
 
 impl Scene {
@@ -163,6 +179,8 @@ impl Scene {
             proximity: Proximity::default(),
             penetration: Penetration::default(),
             contact_nodes: ContactNodes::default(),
+            surface_points: Vec::new(),
+            inside: Vec::new(),
         };
         scene.bodies_changed();
         Ok(scene)
@@ -314,6 +332,7 @@ impl Scene {
             bodies: &self.bodies,
             upper: &self.upper,
             ignored: &self.ignored,
+            with_groups: true,
             pool: self.pool.as_ref(),
         };
         self.intersections.pairs.clear();
@@ -351,6 +370,7 @@ impl Scene {
             bodies: &self.bodies,
             upper: &self.upper,
             ignored: &self.ignored,
+            with_groups: true,
             pool: self.pool.as_ref(),
         };
         self.proximity.pairs.clear();
@@ -364,42 +384,37 @@ impl Scene {
         &self.proximity
     }
 
-    /// Every surface node that is strictly inside another body with a closed surface, and its way out.
+    /// Every surface node that is strictly inside another body with a closed surface, or inside its own
+    /// body of tetrahedra after folding, and its way out.
     ///
-    /// `include(body, into_body)` is asked for ordered pairs of different bodies. Inside is where the
-    /// surface's winding number is not zero, decided exactly; the exit is the closest point of the
-    /// surface. Every method finds these through the bounding trees.
+    /// `include(body, into_body)` is asked for ordered pairs, a body with itself included. Inside another
+    /// body is where its surface's winding number is not zero; inside its own, where tetrahedra that do
+    /// not have the node cover it (counted with their orientation). Both are decided exactly; the second
+    /// only where the surface meets itself, so that in a body with tetrahedra turned over others may be
+    /// missed.
     ///
-    /// Known limits: a node deeper than half the body's thickness leaves on the far side.
+    /// A node leaves through the closest point of the contact patch: the triangles of `into_body` that
+    /// cross `body` or have a node inside it, and that face the node. Where there is no such patch (open
+    /// surfaces have no inside), the closest point of the whole surface. A component that is inside as a
+    /// whole leaves in one direction, that of its node nearest to the surface.
+    ///
+    /// Direction and depth follow the positions continuously, except where a triangle begins or ends to
+    /// cross, where two exits are equally near, and where a component goes under as a whole. A node that
+    /// came out on the far side of a thin body is outside.
     pub fn penetration(&mut self, include: &(dyn Fn(usize, usize) -> bool + Sync)) -> &Penetration {
+        // A node inside is inside, whatever the groups.
         let frame = Frame {
             bodies: &self.bodies,
             upper: &self.upper,
             ignored: &self.ignored,
+            with_groups: false,
             pool: self.pool.as_ref(),
         };
         self.penetration.nodes.clear();
         self.penetration.stats = DetectionStats::default();
-        self.penetration_search.run(&frame, include, &mut self.penetration);
+        let detector = &mut *self.detector;
+        self.penetration_search.run(&frame, detector, include, &mut self.penetration);
         &self.penetration
-    }
-
-    /// The point of a body's surface closest to `point` \[m\], if one is at most `within` \[m\] away.
-    ///
-    /// # Panics
-    /// If there is no such body.
-    pub fn closest_point(&self, body: usize, point: Point, within: f64) -> Option<ClosestPoint> {
-        let body = &self.bodies[body];
-        let found = body.tree().closest_point(&body.positions, point, within)?;
-        let [a, b, c] = body.triangle(found.triangle);
-        let [wa, wb, wc] = found.weights;
-        Some(ClosestPoint {
-            triangle: found.triangle,
-            weights: found.weights,
-            position: vec3::add_scaled(vec3::add_scaled(vec3::scale(a, wa), b, wb), c, wc),
-            distance: found.distance_squared.sqrt(),
-            inside: body.is_inside(&point),
-        })
     }
 
     fn bodies_changed(&mut self) {

@@ -1,8 +1,10 @@
 //! What detection needs to know of a body's surface besides its tree: who owns which feature, whether
 //! the surface is closed, and which parts hang together.
 
+use std::sync::OnceLock;
+
 use palpate_model::Mesh;
-use palpate_model::mesh::NONE;
+use palpate_model::mesh::{NONE, NodeTriangles};
 
 /// Fixed facts of a surface.
 ///
@@ -18,6 +20,43 @@ pub(crate) struct Surface {
     pub(crate) closed: bool,
     /// Per node, the smallest node of its connected part of the surface; itself for an inner node.
     pub(crate) components: Vec<u32>,
+    /// One node of each connected part: the smallest.
+    pub(crate) component_nodes: Vec<u32>,
+    /// The surface triangles around each node.
+    pub(crate) triangles_of_nodes: NodeTriangles,
+    tetrahedra_of_nodes: OnceLock<NodeTetrahedra>,
+}
+
+/// The tetrahedra around each node, in compressed rows.
+#[derive(Clone, Debug)]
+pub(crate) struct NodeTetrahedra {
+    offsets: Vec<u32>,
+    tetrahedra: Vec<u32>,
+}
+
+impl NodeTetrahedra {
+    fn new(mesh: &Mesh) -> Self {
+        let mut offsets = vec![0_u32; mesh.nodes().len() + 1];
+        for &node in mesh.tetrahedra().as_flattened() {
+            offsets[node as usize + 1] += 1;
+        }
+        for node in 0..mesh.nodes().len() {
+            offsets[node + 1] += offsets[node];
+        }
+        let mut next = offsets.clone();
+        let mut tetrahedra = vec![0; 4 * mesh.tetrahedra().len()];
+        for (corner, &node) in mesh.tetrahedra().as_flattened().iter().enumerate() {
+            let slot = &mut next[node as usize];
+            tetrahedra[*slot as usize] = corner as u32 / 4;
+            *slot += 1;
+        }
+        Self { offsets, tetrahedra }
+    }
+
+    pub(crate) fn around(&self, node: u32) -> &[u32] {
+        let range = self.offsets[node as usize] as usize..self.offsets[node as usize + 1] as usize;
+        &self.tetrahedra[range]
+    }
 }
 
 impl Surface {
@@ -41,9 +80,22 @@ impl Surface {
             owned_by_triangle.push(bits);
         }
         let owned = triangle_order.iter().map(|&t| owned_by_triangle[t as usize]).collect();
-        let mut components = Vec::new();
-        join_nodes(mesh, &mut components, |_| true);
-        Self { owned, edge_owners, closed: is_closed(mesh), components }
+        let components = join_nodes(mesh);
+        let smallest = |&node: &u32| components[node as usize] == node;
+        Self {
+            owned,
+            edge_owners,
+            closed: is_closed(mesh),
+            component_nodes: mesh.surface_nodes().iter().copied().filter(smallest).collect(),
+            components,
+            triangles_of_nodes: mesh.node_triangles(),
+            tetrahedra_of_nodes: OnceLock::new(),
+        }
+    }
+
+    /// The tetrahedra around each node of `mesh`, the surface's own; made when first asked for.
+    pub(crate) fn tetrahedra_of_nodes(&self, mesh: &Mesh) -> &NodeTetrahedra {
+        self.tetrahedra_of_nodes.get_or_init(|| NodeTetrahedra::new(mesh))
     }
 }
 
@@ -58,20 +110,18 @@ fn is_closed(mesh: &Mesh) -> bool {
     !balance.is_empty() && balance.iter().all(|&balance| balance == 0)
 }
 
-/// Labels each node with the smallest node that the triangles of `keep` connect it with.
-pub(crate) fn join_nodes(mesh: &Mesh, labels: &mut Vec<u32>, keep: impl Fn(u32) -> bool) {
-    labels.clear();
-    labels.extend(0..mesh.nodes().len() as u32);
-    for (triangle, &[a, b, c]) in mesh.triangles().iter().enumerate() {
-        if keep(triangle as u32) {
-            join(labels, a, b);
-            join(labels, b, c);
-        }
+/// Labels each node with the smallest node that triangles connect it with.
+fn join_nodes(mesh: &Mesh) -> Vec<u32> {
+    let mut labels: Vec<u32> = (0..mesh.nodes().len() as u32).collect();
+    for &[a, b, c] in mesh.triangles() {
+        join(&mut labels, a, b);
+        join(&mut labels, b, c);
     }
     // Labels never exceed their index: one sweep upwards makes each of them final.
     for node in 0..labels.len() {
         labels[node] = labels[labels[node] as usize];
     }
+    labels
 }
 
 fn join(labels: &mut [u32], a: u32, b: u32) {

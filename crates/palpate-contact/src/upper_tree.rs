@@ -147,6 +147,26 @@ impl UpperTree {
         visited
     }
 
+    /// Calls `visit` with each body for which `reaches` holds, of its box and of all above it.
+    pub(crate) fn visit<S>(
+        &self,
+        state: &mut S,
+        reaches: impl Fn(&S, &Aabb) -> bool,
+        mut visit: impl FnMut(&mut S, u32),
+    ) {
+        let mut index = 0;
+        while let Some(node) = self.nodes.get(index as usize) {
+            if !reaches(state, &node.bounds) {
+                index = node.skip;
+                continue;
+            }
+            if let Some(body) = node.body {
+                visit(state, body);
+            }
+            index += 1;
+        }
+    }
+
     /// Box around all bodies.
     pub(crate) fn bounds(&self) -> Aabb {
         self.nodes.first().map_or(Aabb::EMPTY, |root| root.bounds)

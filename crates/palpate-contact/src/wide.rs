@@ -11,6 +11,7 @@ mod adjacency;
 mod boxes;
 mod features;
 mod hierarchy;
+mod nearest;
 mod order;
 mod separation;
 #[cfg(test)]
@@ -25,8 +26,10 @@ use palpate_model::mesh::NONE;
 
 use crate::simd::Isa;
 use adjacency::Adjacency;
+pub(crate) use boxes::Block;
 pub(crate) use features::{EdgePairs, VertexPairs};
 pub(crate) use hierarchy::Hierarchy;
+pub(crate) use nearest::{BlockMeasure, WideSurface};
 pub(crate) use separation::{Reach, SeparateTriangles};
 pub(crate) use traverse::{Sides, Traversal};
 

@@ -58,17 +58,23 @@ fn a_frame_allocates_nothing() {
         scene.ignore(1, 1, true).expect("there are three");
         let shared = IntersectionOptions { shared_nodes: true, ..IntersectionOptions::default() };
         let at_rest = ProximityOptions { close_at_rest: false };
-        let mut found = [0; 6];
+        let mut found = [0; 9];
         let mut round = |scene: &mut Scene| {
             for frame in &frames {
                 scene.update(frame).expect("finite positions");
                 found[0] += scene.intersections(&IntersectionOptions::default()).pairs.len();
                 found[1] += scene.proximity(&|_, _| Some(0.1)).pairs.len();
                 found[2] += scene.penetration(&|_, _| true).nodes.len();
-                scene.closest_point(0, [0.0; 3], 1.0);
                 found[3] += scene.intersections(&shared).pairs.len();
                 found[4] += scene.proximity_with(&|_, _| Some(0.1), &at_rest).pairs.len();
                 found[5] += scene.contact_nodes(&shared).nodes[2].len();
+                let points = &frame[0][..50];
+                let hits = scene.closest(points, None, 1.0).expect("finite");
+                found[6] += hits.iter().flatten().count();
+                let inside = scene.contains(points, None).expect("finite");
+                found[7] += inside.iter().filter(|&&inside| inside).count();
+                let hits = scene.cast(points, &[[1.0, 2.0, 3.0]; 50], None, f64::INFINITY);
+                found[8] += hits.expect("finite").iter().flatten().count();
             }
         };
         round(&mut scene);

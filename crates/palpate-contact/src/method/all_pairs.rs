@@ -6,7 +6,6 @@ use palpate_geometry::triangles_intersect;
 
 use super::{Detector, LimitOf};
 use crate::leaf_pairs::share_a_node;
-use crate::left_out::CommonGroups;
 use crate::neighbours::neighbours_meet;
 use crate::pairs::TrianglePair;
 use crate::proximity::{edge_pair, sort, vertex_triangle};
@@ -32,7 +31,7 @@ impl Detector for AllPairs {
                 if !wanted || frame.is_ignored(body_a as u32, body_b as u32) {
                     continue;
                 }
-                let groups = CommonGroups::of(a, b);
+                let groups = frame.common_groups(a, b);
                 found.stats.object_pairs += 1;
                 for (triangle_a, &corners_a) in a.mesh.triangles().iter().enumerate() {
                     let points_a = a.triangle(triangle_a as u32);

@@ -8,7 +8,6 @@ use palpate_geometry::{Aabb, triangles_intersect, vec3};
 use super::paper::Paper;
 use super::{Detector, LimitOf};
 use crate::leaf_pairs::share_a_node;
-use crate::left_out::CommonGroups;
 use crate::neighbours::neighbours_meet;
 use crate::pairs::TrianglePair;
 use crate::scene::{Frame, IntersectionOptions, Intersections, Proximity, SceneBody};
@@ -225,7 +224,7 @@ fn meeting(
     let triangles = [a.index, b.index];
     if neighbours && !shared_nodes
         || frame.is_ignored(a.body, b.body)
-        || CommonGroups::of(body_a, body_b).is_some_and(|groups| groups.of_triangles(triangles))
+        || frame.common_groups(body_a, body_b).is_some_and(|groups| groups.of_triangles(triangles))
     {
         return None;
     }

@@ -7,7 +7,6 @@ use palpate_geometry::{Aabb, triangles_intersect};
 use super::{Detector, LimitOf};
 use crate::bounding_tree::corner_points;
 use crate::leaf_pairs::{BodyPair, Cost, LeafPairSearch, meets, share_a_node, widened};
-use crate::left_out::CommonGroups;
 use crate::neighbours::neighbours_meet;
 use crate::pairs::{ProximityPair, TrianglePair};
 use crate::proximity::{edge_pair, sort, vertex_triangle};
@@ -86,7 +85,7 @@ impl Detector for Paper {
 #[inline]
 fn in_common_group(frame: &Frame, pair: &BodyPair, [i, j]: [u32; 2]) -> bool {
     let (a, b) = (&frame.bodies[pair.a as usize], &frame.bodies[pair.b as usize]);
-    CommonGroups::of(a, b).is_some_and(|groups| {
+    frame.common_groups(a, b).is_some_and(|groups| {
         let (order_a, order_b) = (a.tree().triangle_order(), b.tree().triangle_order());
         groups.of_triangles([order_a[i as usize], order_b[j as usize]])
     })
@@ -94,7 +93,7 @@ fn in_common_group(frame: &Frame, pair: &BodyPair, [i, j]: [u32; 2]) -> bool {
 
 /// The exact test of two triangles, given by their positions in the trees; of triangles that share
 /// nodes with `shared_nodes`.
-pub(crate) fn meeting_triangles(
+fn meeting_triangles(
     frame: &Frame,
     pair: &BodyPair,
     [i, j]: [u32; 2],

@@ -9,7 +9,6 @@ use rayon::prelude::*;
 
 use super::{Detector, LimitOf};
 use crate::leaf_pairs::{BodyPair, Cost, for_each};
-use crate::left_out::CommonGroups;
 use crate::neighbours::neighbours_meet;
 use crate::pairs::{ProximityPair, TrianglePair};
 use crate::proximity::{edge_pair, sort, vertex_triangle};
@@ -17,7 +16,9 @@ use crate::scene::{
     DetectionStats, Frame, IntersectionOptions, Intersections, Proximity, SceneBody,
 };
 use crate::simd::Isa;
-use crate::wide::{EdgePairs, Reach, SeparateTriangles, Sides, Traversal, VertexPairs, WideBody};
+use crate::wide::{
+    EdgePairs, Reach, SeparateTriangles, Sides, Traversal, VertexPairs, WideBody, WideSurface,
+};
 
 /// Block pairs of the upper levels in a task.
 const SEEDS_PER_TASK: usize = 64;
@@ -237,6 +238,10 @@ impl Detector for Wide {
         })
     }
 
+    fn wide_surface(&self, body: usize) -> Option<WideSurface<'_>> {
+        Some(WideSurface { isa: self.isa, origin: self.origin, body: &self.bodies[body] })
+    }
+
     fn intersections(
         &mut self,
         frame: &Frame,
@@ -403,7 +408,7 @@ impl Search<'_> {
             }
             let (body_a, body_b) =
                 (&self.frame.bodies[pair.a as usize], &self.frame.bodies[pair.b as usize]);
-            if let Some(groups) = CommonGroups::of(body_a, body_b) {
+            if let Some(groups) = self.frame.common_groups(body_a, body_b) {
                 kept.retain(|&[slot_a, slot_b]| {
                     let triangles = [a.triangles.element(slot_a), b.triangles.element(slot_b)];
                     !groups.of_triangles(triangles)

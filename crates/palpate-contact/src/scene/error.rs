@@ -89,4 +89,34 @@ pub enum SceneError {
         /// The body.
         body: usize,
     },
+    /// A point or direction that is NaN or infinite.
+    #[error("{array}[{row}]: got {values:?}, expected finite numbers")]
+    RowNotFinite {
+        /// Which argument.
+        array: &'static str,
+        /// The row.
+        row: usize,
+        /// What came.
+        values: [f64; 3],
+    },
+    /// Directions for another number of rays.
+    #[error("directions: got {given} rows, expected {expected}, one for each origin")]
+    DirectionCount {
+        /// Directions given.
+        given: usize,
+        /// Origins given.
+        expected: usize,
+    },
+    /// A ray without a direction.
+    #[error("directions[{row}]: got a zero vector, expected one with a direction")]
+    ZeroDirection {
+        /// The ray.
+        row: usize,
+    },
+    /// A distance that is negative or NaN.
+    #[error("max_distance: got {distance}, expected a number of at least 0")]
+    MaxDistance {
+        /// What came.
+        distance: f64,
+    },
 }

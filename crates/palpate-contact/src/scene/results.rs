@@ -2,8 +2,6 @@
 
 use std::time::Duration;
 
-use palpate_geometry::Point;
-
 use super::SceneBody;
 use crate::pairs::{PenetratingNode, ProximityPair, TrianglePair};
 
@@ -107,19 +105,4 @@ pub struct UpdateStats {
     pub time: Duration,
     /// Tree nodes refitted.
     pub nodes_refitted: u64,
-}
-
-/// The point of a body's surface closest to a given point.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ClosestPoint {
-    /// Surface triangle.
-    pub triangle: u32,
-    /// Barycentric weights of the closest point on it.
-    pub weights: [f64; 3],
-    /// The closest point \[m\].
-    pub position: Point,
-    /// Distance \[m\].
-    pub distance: f64,
-    /// Whether the given point is strictly inside the body; never for an open surface.
-    pub inside: bool,
 }

@@ -5,6 +5,7 @@ mod left_out;
 mod organs;
 mod parry;
 mod penetration;
+mod points;
 mod proximity;
 mod scene;
 mod scenes;

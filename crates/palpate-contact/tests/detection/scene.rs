@@ -3,7 +3,6 @@
 use std::sync::Arc;
 
 use palpate_contact::{IntersectionOptions, Method, Scene, SceneError, SceneOptions, TrianglePair};
-use palpate_geometry::{point_triangle, vec3};
 use palpate_model::{Mesh, Structure};
 
 use crate::intersections::{scene, validate};
@@ -124,31 +123,6 @@ fn wrong_arguments_are_named_and_change_nothing() {
         assert_eq!(scene.positions(body), rest);
     }
     assert_eq!(pairs(&mut scene), before);
-}
-
-#[test]
-fn the_closest_point_is_the_closest_of_all_triangles() {
-    let meshes = meshes();
-    let scene = scene(&meshes, SceneOptions::default());
-    let mut random = Random(9);
-    for _ in 0..300 {
-        let point = random.vector(4.0);
-        for (body, mesh) in meshes.iter().enumerate() {
-            let distance = |triangle: usize| {
-                let corners = mesh.triangles()[triangle].map(|node| mesh.nodes()[node as usize]);
-                point_triangle(point, &corners).distance_squared.sqrt()
-            };
-            let all = (0..mesh.triangles().len()).map(distance);
-            let nearest = all.fold(f64::INFINITY, f64::min);
-            let found = scene.closest_point(body, point, f64::INFINITY).expect("a surface");
-            assert_eq!(found.distance, nearest);
-            assert_eq!(distance(found.triangle as usize), nearest);
-            let away = vec3::distance_squared(found.position, point).sqrt();
-            assert!((away - nearest).abs() < 1e-12);
-            assert_eq!(scene.closest_point(body, point, nearest), Some(found));
-            assert_eq!(scene.closest_point(body, point, nearest.next_down()), None);
-        }
-    }
 }
 
 #[test]

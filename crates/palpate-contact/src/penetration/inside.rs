@@ -1,0 +1,134 @@
+//! Which surface nodes are inside.
+//!
+//! Only crossing triangles change the side: what the others connect is inside as a whole, or outside. So
+//! one point decides for each connected part next to crossing triangles, and for each component of the
+//! surface that has none.
+
+use crate::scene::SceneBody;
+
+/// What is known of a node.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Side {
+    /// Not located, and no matter unless its neighbours turn out to be inside.
+    Unknown,
+    /// Of a crossing triangle, not located yet.
+    Border,
+    Inside,
+    Outside,
+}
+
+/// The nodes of a body that are inside. Keeps its memory.
+#[derive(Debug, Default)]
+pub(super) struct Inside {
+    sides: Vec<Side>,
+    /// By triangle.
+    crosses: Vec<bool>,
+    /// By the smallest node of a component.
+    component_crosses: Vec<bool>,
+    border: Vec<u32>,
+    pending: Vec<u32>,
+    /// Nodes inside, of components that cross; sorted.
+    pub(super) nodes: Vec<u32>,
+    /// (component, node) of those that do not cross, all inside; sorted.
+    pub(super) swallowed: Vec<(u32, u32)>,
+    patch: Vec<bool>,
+}
+
+impl Inside {
+    pub(super) fn is_empty(&self) -> bool {
+        self.nodes.is_empty() && self.swallowed.is_empty()
+    }
+
+    /// Whether a triangle crosses or has a node inside, after `make_patch`.
+    pub(super) fn is_in_patch(&self, triangle: u32) -> bool {
+        self.patch[triangle as usize]
+    }
+
+    /// Locates the nodes of `body`, given its crossing triangles, some of them several times.
+    pub(super) fn locate(
+        &mut self,
+        body: &SceneBody,
+        crossing: impl Iterator<Item = u32>,
+        mut is_inside: impl FnMut(u32) -> bool,
+    ) {
+        let (triangles, surface) = (body.mesh.triangles(), &body.surface);
+        let node_count = body.mesh.nodes().len();
+        reset(&mut self.sides, node_count, Side::Unknown);
+        reset(&mut self.crosses, triangles.len(), false);
+        reset(&mut self.component_crosses, node_count, false);
+        self.border.clear();
+        self.nodes.clear();
+        self.swallowed.clear();
+        for triangle in crossing {
+            if std::mem::replace(&mut self.crosses[triangle as usize], true) {
+                continue;
+            }
+            let nodes = triangles[triangle as usize];
+            self.component_crosses[surface.components[nodes[0] as usize] as usize] = true;
+            for node in nodes {
+                if std::mem::replace(&mut self.sides[node as usize], Side::Border) == Side::Unknown
+                {
+                    self.border.push(node);
+                }
+            }
+        }
+        for index in 0..self.border.len() {
+            let node = self.border[index];
+            if self.sides[node as usize] == Side::Border {
+                let side = if is_inside(node) { Side::Inside } else { Side::Outside };
+                self.spread(body, node, side);
+            }
+        }
+        for &node in &surface.component_nodes {
+            if !self.component_crosses[node as usize] && is_inside(node) {
+                let before = self.nodes.len();
+                self.spread(body, node, Side::Inside);
+                self.swallowed.extend(self.nodes.drain(before..).map(|inside| (node, inside)));
+            }
+        }
+        self.nodes.sort_unstable();
+        self.swallowed.sort_unstable();
+    }
+
+    /// Gives `side` to all that triangles which do not cross connect with `start`; outside no further
+    /// than from border to border.
+    fn spread(&mut self, body: &SceneBody, start: u32, side: Side) {
+        self.sides[start as usize] = side;
+        self.pending.push(start);
+        while let Some(node) = self.pending.pop() {
+            if side == Side::Inside {
+                self.nodes.push(node);
+            }
+            for &triangle in body.surface.triangles_of_nodes.around(node) {
+                if self.crosses[triangle as usize] {
+                    continue;
+                }
+                for other in body.mesh.triangles()[triangle as usize] {
+                    let former = &mut self.sides[other as usize];
+                    if *former == Side::Border || (*former == Side::Unknown && side == Side::Inside)
+                    {
+                        *former = side;
+                        self.pending.push(other);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Marks the triangles that cross or have a node inside.
+    pub(super) fn make_patch(&mut self, body: &SceneBody) {
+        self.patch.clear();
+        self.patch.extend_from_slice(&self.crosses);
+        let swallowed = self.swallowed.iter().map(|&(_, node)| node);
+        for node in self.nodes.iter().copied().chain(swallowed) {
+            for &triangle in body.surface.triangles_of_nodes.around(node) {
+                self.patch[triangle as usize] = true;
+            }
+        }
+    }
+}
+
+fn reset<T: Clone>(values: &mut Vec<T>, count: usize, value: T) {
+    values.clear();
+    values.resize(count, value);
+}

@@ -1,0 +1,71 @@
+//! The closest surface point.
+
+use palpate_geometry::{Aabb, Point, PointTriangle, point_triangle};
+
+use crate::nearest::{Distance, Surfaces, rounding_at};
+
+/// The surface point found closest, before it is dressed for the user.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Closest {
+    pub(crate) body: u32,
+    pub(crate) triangle: u32,
+    pub(crate) weights: [f64; 3],
+    pub(crate) distance_squared: f64,
+}
+
+/// The search for the surface point closest to a point, among bodies one after the other.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ClosestSearch {
+    pub(crate) point: Point,
+    /// Absolute rounding error of a distance here \[m\].
+    rounding: f64,
+    /// No box further than this can hold a better point \[m²\].
+    limit_squared: f64,
+    pub(crate) best: Option<Closest>,
+}
+
+impl ClosestSearch {
+    /// Looks no further than `within` \[m\], or hardly; `bounds` holds the bodies.
+    pub(crate) fn new(point: Point, within: f64, bounds: &Aabb) -> Self {
+        let rounding = rounding_at(bounds, &point);
+        let mut search = Self { point, rounding, limit_squared: f64::INFINITY, best: None };
+        search.limit_squared = search.limit(within);
+        search
+    }
+
+    /// A hair beyond `distance`, so that rounding never culls an equal.
+    fn limit(&self, distance: f64) -> f64 {
+        let limit = distance * (1.0 + 1e-9) + self.rounding;
+        limit * limit
+    }
+
+    /// Whether a box may hold a point that is closer, or as close.
+    pub(crate) fn reaches(&self, bounds: &Aabb) -> bool {
+        !bounds.is_empty() && bounds.distance_squared(&self.point) <= self.limit_squared
+    }
+
+    /// Searches the triangles of a body for which `keep` holds. Of equals, the smallest
+    /// (body, triangle) stays.
+    pub(crate) fn body(
+        &mut self,
+        surfaces: &Surfaces,
+        body: u32,
+        keep: impl Fn(u32, &[Point; 3], &PointTriangle) -> bool,
+    ) {
+        let scene_body = &surfaces.bodies[body as usize];
+        surfaces.search(body, &Distance(self.point), self.limit_squared, |triangle| {
+            let corners = scene_body.triangle(triangle);
+            let found = point_triangle(self.point, &corners);
+            let better = self.best.as_ref().is_none_or(|best| {
+                let best = (best.distance_squared, best.body, best.triangle);
+                (found.distance_squared, body, triangle) < best
+            });
+            if better && keep(triangle, &corners, &found) {
+                let PointTriangle { distance_squared, weights, .. } = found;
+                self.best = Some(Closest { body, triangle, weights, distance_squared });
+                self.limit_squared = self.limit_squared.min(self.limit(distance_squared.sqrt()));
+            }
+            self.limit_squared
+        });
+    }
+}
