@@ -1,7 +1,14 @@
 """Real-time contact detection and deformation for soft bodies made of tetrahedra."""
 
 from palpate._core import __version__
-from palpate.contacts import DetectionStats, Intersections, Proximity
+from palpate.contacts import (
+    ClosestPoints,
+    DetectionStats,
+    Intersections,
+    Penetration,
+    Proximity,
+    RayHits,
+)
 from palpate.errors import (
     CheckpointError,
     Diagnostic,
@@ -19,6 +26,7 @@ from palpate.simulation import Contacts, Simulation, Snapshot, StepReport
 __all__ = [
     "Body",
     "CheckpointError",
+    "ClosestPoints",
     "Contact",
     "Contacts",
     "Defect",
@@ -31,7 +39,9 @@ __all__ = [
     "Model",
     "ModelError",
     "PalpateError",
+    "Penetration",
     "Proximity",
+    "RayHits",
     "RigidKey",
     "Scene",
     "Simulation",

@@ -62,6 +62,7 @@ class Intersections:
 
 
 @dataclass(frozen=True, eq=False)
+<<<<<<< HEAD
 class Proximity:
     """Surface elements closer than the asked distance, sorted by (kind, bodies, elements).
 
@@ -104,3 +105,58 @@ class Proximity:
     def __repr__(self) -> str:
         edges = int((self.kind == self.EDGE_EDGE).sum())
         return f"Proximity({len(self) - edges} vertex-triangle pairs, {edges} edge-edge pairs)"
+=======
+class Penetration:
+    """Surface nodes inside bodies, and their way out, sorted; read-only.
+
+    ``bodies`` (k, 2): body of the node, and the body it is inside of (the same after folding).
+    ``nodes`` (k,): the node. ``triangles`` (k,), ``weights`` (k, 3): the surface triangle of the second
+    body to leave through, and where on it. ``directions`` (k, 3): unit vector from the node to that
+    point. ``depths`` (k,): distance to it [m], positive.
+    """
+
+    bodies: IndexArray
+    nodes: IndexArray
+    triangles: IndexArray
+    weights: Float64Array
+    directions: Float64Array
+    depths: Float64Array
+    stats: DetectionStats
+
+    def __len__(self) -> int:
+        return len(self.nodes)
+
+    def __repr__(self) -> str:
+        deepest = f", deepest {self.depths.max():.3g} m" if len(self) else ""
+        return f"Penetration({len(self)} nodes{deepest})"
+
+
+@dataclass(frozen=True, eq=False)
+class ClosestPoints:
+    """The surface point closest to each given point; read-only.
+
+    ``bodies`` (k,) and ``triangles`` (k,): where it is, -1 where nothing is near enough. ``weights``
+    (k, 3): barycentric, on the triangle. ``positions`` (k, 3) [m]. ``distances`` (k,) [m]. Without an
+    answer weights and positions are NaN and the distance is infinite.
+    """
+
+    bodies: IndexArray
+    triangles: IndexArray
+    weights: Float64Array
+    positions: Float64Array
+    distances: Float64Array
+
+    def __len__(self) -> int:
+        return len(self.bodies)
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({(self.bodies >= 0).sum()} of {len(self)})"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class RayHits(ClosestPoints):
+    """Where each ray first meets a surface; fields as those of `ClosestPoints`.
+
+    ``bodies`` is -1 where a ray misses. ``distances`` (k,) [m] are measured along the rays.
+    """
+>>>>>>> 5c2f919 (Ask for closest points, containment, rays and penetration from Python)

@@ -11,7 +11,14 @@ import numpy.typing as npt
 
 from palpate import _arrays, _core
 from palpate._arrays import Float64Array, IndexArray
-from palpate.contacts import DetectionStats, Intersections, Proximity
+from palpate.contacts import (
+    ClosestPoints,
+    DetectionStats,
+    Intersections,
+    Penetration,
+    Proximity,
+    RayHits,
+)
 from palpate.mesh import Mesh, as_mesh
 from palpate.model import Body, Model, body_index, read_model
 
@@ -206,6 +213,97 @@ class Scene:
     def contact_nodes(self, *, self_contact: bool = True) -> tuple[IndexArray, ...]:
         """Nodes of the triangles that meet, sorted, one array per body: the paper's own output."""
         return self._core.contact_nodes(bool(self_contact))
+    def penetration(self, *, self_contact: bool = True) -> Penetration:
+        """Every surface node strictly inside another body, or inside its own, with its way out.
+
+        Inside another body is where its closed surface winds around the node; inside its own, where
+        tetrahedra cover the node that do not have it, after folding. Both are decided exactly.
+
+        A node leaves through the closest point of the contact patch: those triangles of the other
+        surface that cross the node's body or reach into it, and face the node. So the exits of a patch
+        agree, also in a thin body pushed in by more than half its thickness. A part that is inside as
+        a whole, without crossing, leaves in one direction.
+
+        Known limits: direction and depth jump where a triangle begins or ends to cross, where two
+        exits are equally near, and when a part goes under as a whole. A node that came out on the far
+        side of a thin body is outside. A body that is folded in itself and has tetrahedra turned over
+        may be found wanting.
+
+        Parameters
+        ----------
+        self_contact : bool
+            Whether each body is also tested against itself. Needs tetrahedra.
+        """
+        arrays, stats = self._core.penetration(bool(self_contact))
+        return Penetration(*arrays, DetectionStats(*stats))
+
+    def closest(
+        self,
+        points: npt.ArrayLike,
+        *,
+        body: int | str | None = None,
+        max_distance: float = np.inf,
+    ) -> ClosestPoints:
+        """The surface point closest to each point, of one body or of all.
+
+        Of equally close points that of the lowest (body, triangle).
+
+        Parameters
+        ----------
+        points : (k, 3) array
+            Points [m].
+        body : int or str, optional
+            The only body to look at.
+        max_distance : float
+            Points farther than this [m] from any surface get no answer.
+        """
+        return ClosestPoints(*self._core.closest(*self._query(body, max_distance, points=points)))
+
+    def contains(
+        self, points: npt.ArrayLike, *, body: int | str | None = None
+    ) -> npt.NDArray[np.bool_]:
+        """Whether points [m] (k, 3) are strictly inside bodies: shape (k, bodies), or (k,) for one.
+
+        Inside is where the surface's winding number is not zero, decided exactly: a point on the
+        surface is not inside, and nothing is inside a body whose surface is open.
+        """
+        array = _arrays.points(points, "points")
+        if body is not None:
+            return self._core.contains(array, body_index(self._names, body))
+        return self._core.contains(array, None).reshape(len(array), len(self))
+
+    def cast(
+        self,
+        origins: npt.ArrayLike,
+        directions: npt.ArrayLike,
+        *,
+        body: int | str | None = None,
+        max_distance: float = np.inf,
+    ) -> RayHits:
+        """Where each ray first meets the surface of one body, or of any.
+
+        Surfaces are hit from both sides and where a ray begins on them; no ray slips through between
+        two triangles. Of hits at the same distance that of the lowest (body, triangle).
+
+        Parameters
+        ----------
+        origins : (k, 3) array
+            Where the rays begin [m].
+        directions : (k, 3) array
+            Of any length but zero.
+        body : int or str, optional
+            The only body to look at.
+        max_distance : float
+            Length of the rays [m].
+        """
+        given = self._query(body, max_distance, origins=origins, directions=directions)
+        return RayHits(*self._core.cast(*given))
+
+    def _query(self, body: int | str | None, max_distance: float, **points: Any) -> tuple[Any, ...]:
+        arrays = [_arrays.points(array, name) for name, array in points.items()]
+        index = None if body is None else body_index(self._names, body)
+        distance = float(max_distance)
+        return (*arrays, index, distance)
 
     def tree_stats(self, body: int | str) -> dict[str, Any]:
         """Counts of a body's bounding tree: nodes, leaves, depth, how full the leaves are."""

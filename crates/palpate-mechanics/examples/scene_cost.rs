@@ -47,7 +47,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let mut detect = start.elapsed();
         dynamics.begin_step();
         let start = Instant::now();
-        let include = |a: usize, b: usize| dynamics.search_distance(a, b).is_some();
+        let include = |a: usize, b: usize| a != b && dynamics.search_distance(a, b).is_some();
         let penetration = scene.penetration(&include).nodes.clone();
         let pairs = scene.proximity(&|a, b| dynamics.search_distance(a, b)).pairs.clone();
         detect += start.elapsed();

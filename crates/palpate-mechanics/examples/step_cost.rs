@@ -67,7 +67,7 @@ fn measure(name: &str, bodies: Vec<Body>, steps: usize) -> Result<(), Box<dyn Er
         let start = Instant::now();
         scene.update(&positions)?;
         dynamics.begin_step();
-        let include = |a: usize, b: usize| dynamics.search_distance(a, b).is_some();
+        let include = |a: usize, b: usize| a != b && dynamics.search_distance(a, b).is_some();
         let penetration = scene.penetration(&include).nodes.clone();
         let pairs = scene.proximity(&|a, b| dynamics.search_distance(a, b)).pairs.clone();
         let found = start.elapsed();

@@ -1,11 +1,12 @@
 //! `palpate._core.Scene`: contact detection on the caller's positions.
 
+mod points;
 mod queries;
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use numpy::{PyArray2, PyReadonlyArray1, PyReadonlyArray2};
+use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2};
 use palpate::contact::{IntersectionOptions, Method, ProximityOptions, Split};
 use palpate::geometry::Point;
 use palpate::{Scene, SceneOptions};
@@ -13,12 +14,13 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 
-use crate::arrays::{matrix, points};
+use crate::arrays::{matrix, points, rows, vector};
 use crate::errors::raise;
 use crate::mesh::PyMesh;
 use crate::model::structure_from_python;
 
-use queries::{IntersectionColumns, ProximityColumns};
+use points::{PenetrationArrays, SurfacePointArrays, penetration_arrays, surface_point_arrays};
+use queries::{IntersectionColumns, ProximityColumns, stats_row};
 pub(crate) use queries::{StatsRow, intersection_rows};
 
 /// Bodies and their bounding trees. The lock lets two Python threads use one scene in turn.
@@ -138,6 +140,58 @@ impl PyScene {
         let groups: Vec<u32> =
             groups.as_array().iter().enumerate().map(group).collect::<PyResult<_>>()?;
         raise(py, self.lock().0.set_groups(body, &groups))
+    }
+
+    fn penetration<'py>(
+        &self,
+        py: Python<'py>,
+        self_contact: bool,
+    ) -> PyResult<(PenetrationArrays<'py>, StatsRow)> {
+        let (nodes, stats) = py.detach(|| {
+            let mut guard = self.lock();
+            let found = guard.0.penetration(&|a, b| self_contact || a != b);
+            (found.nodes.clone(), stats_row(&found.stats))
+        });
+        Ok((penetration_arrays(py, &nodes)?, stats))
+    }
+
+    // The three below are not detached: their arrays belong to Python, which could change them meanwhile.
+
+    fn closest<'py>(
+        &self,
+        py: Python<'py>,
+        points: PyReadonlyArray2<'py, f64>,
+        body: Option<usize>,
+        max_distance: f64,
+    ) -> PyResult<SurfacePointArrays<'py>> {
+        let points = rows(&points, "points")?;
+        let mut guard = self.lock();
+        surface_point_arrays(py, raise(py, guard.0.closest(points, body, max_distance))?)
+    }
+
+    fn contains<'py>(
+        &self,
+        py: Python<'py>,
+        points: PyReadonlyArray2<'py, f64>,
+        body: Option<usize>,
+    ) -> PyResult<Bound<'py, PyArray1<bool>>> {
+        let points = rows(&points, "points")?;
+        let mut guard = self.lock();
+        Ok(vector(py, raise(py, guard.0.contains(points, body))?.to_vec()))
+    }
+
+    fn cast<'py>(
+        &self,
+        py: Python<'py>,
+        origins: PyReadonlyArray2<'py, f64>,
+        directions: PyReadonlyArray2<'py, f64>,
+        body: Option<usize>,
+        max_distance: f64,
+    ) -> PyResult<SurfacePointArrays<'py>> {
+        let (origins, directions) = (rows(&origins, "origins")?, rows(&directions, "directions")?);
+        let mut guard = self.lock();
+        let found = raise(py, guard.0.cast(origins, directions, body, max_distance))?;
+        surface_point_arrays(py, found)
     }
 
     fn tree_stats<'py>(&self, py: Python<'py>, body: usize) -> PyResult<Bound<'py, PyDict>> {

@@ -150,7 +150,8 @@ impl Simulation {
 
         let begin = Instant::now();
         let dynamics = &self.dynamics;
-        let deformable_pair = |a: usize, b: usize| dynamics.search_distance(a, b).is_some();
+        let deformable_pair =
+            |a: usize, b: usize| a != b && dynamics.search_distance(a, b).is_some();
         let penetration = &mut self.penetration;
         penetration.clone_from(&self.scene.penetration(&deformable_pair).nodes);
         times.penetration = begin.elapsed();

@@ -82,7 +82,7 @@ impl World {
             (0..self.dynamics.body_count()).map(|body| self.dynamics.positions(body)).collect();
         self.scene.update(&positions).unwrap();
         let dynamics = &self.dynamics;
-        let include = |a: usize, b: usize| dynamics.search_distance(a, b).is_some();
+        let include = |a: usize, b: usize| a != b && dynamics.search_distance(a, b).is_some();
         let penetration = self.scene.penetration(&include).nodes.clone();
         let pairs = self.scene.proximity(&|a, b| dynamics.search_distance(a, b)).pairs.clone();
         (pairs, penetration)

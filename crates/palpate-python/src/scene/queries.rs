@@ -90,7 +90,7 @@ pub(crate) fn intersection_rows(found: &Intersections) -> (Vec<[u32; 4]>, StatsR
 }
 
 /// The statistics as a row for Python.
-fn stats_row(stats: &DetectionStats) -> StatsRow {
+pub(super) fn stats_row(stats: &DetectionStats) -> StatsRow {
     (
         stats.object_time.as_secs_f64(),
         stats.traversal_time.as_secs_f64(),
