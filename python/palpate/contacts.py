@@ -110,9 +110,9 @@ class Penetration:
     """Surface nodes inside bodies, and their way out, sorted; read-only.
 
     ``bodies`` (k, 2): body of the node, and the body it is inside of (the same after folding).
-    ``nodes`` (k,): the node. ``triangles`` (k,), ``weights`` (k, 3): the surface triangle of the second
-    body to leave through, and where on it. ``directions`` (k, 3): unit vector from the node to that
-    point. ``depths`` (k,): distance to it [m], positive.
+    ``nodes`` (k,): the node. ``triangles`` (k,), ``weights`` (k, 3): the surface triangle of the
+    second body to leave through, and where on it. ``directions`` (k, 3): unit vector from the node
+    to that point. ``depths`` (k,): distance to it [m], positive.
     """
 
     bodies: IndexArray
@@ -135,9 +135,9 @@ class Penetration:
 class ClosestPoints:
     """The surface point closest to each given point; read-only.
 
-    ``bodies`` (k,) and ``triangles`` (k,): where it is, -1 where nothing is near enough. ``weights``
-    (k, 3): barycentric, on the triangle. ``positions`` (k, 3) [m]. ``distances`` (k,) [m]. Without an
-    answer weights and positions are NaN and the distance is infinite.
+    ``bodies`` (k,) and ``triangles`` (k,): where it is, -1 where nothing is near enough.
+    ``weights`` (k, 3): barycentric, on the triangle. ``positions`` (k, 3) [m]. ``distances`` (k,)
+    [m]. Without an answer weights and positions are NaN and the distance is infinite.
     """
 
     bodies: IndexArray

@@ -220,14 +220,14 @@ class Scene:
         tetrahedra cover the node that do not have it, after folding. Both are decided exactly.
 
         A node leaves through the closest point of the contact patch: those triangles of the other
-        surface that cross the node's body or reach into it, and face the node. So the exits of a patch
-        agree, also in a thin body pushed in by more than half its thickness. A part that is inside as
-        a whole, without crossing, leaves in one direction.
+        surface that cross the node's body or reach into it, and face the node. So the exits of a
+        patch agree, also in a thin body pushed in by more than half its thickness. A part that is
+        inside as a whole, without crossing, leaves in one direction.
 
         Known limits: direction and depth jump where a triangle begins or ends to cross, where two
-        exits are equally near, and when a part goes under as a whole. A node that came out on the far
-        side of a thin body is outside. A body that is folded in itself and has tetrahedra turned over
-        may be found wanting.
+        exits are equally near, and when a part goes under as a whole. A node that came out on the
+        far side of a thin body is outside. In a body with tetrahedra turned over, nodes inside
+        itself may be missed.
 
         Parameters
         ----------
@@ -282,8 +282,8 @@ class Scene:
     ) -> RayHits:
         """Where each ray first meets the surface of one body, or of any.
 
-        Surfaces are hit from both sides and where a ray begins on them; no ray slips through between
-        two triangles. Of hits at the same distance that of the lowest (body, triangle).
+        Surfaces are hit from both sides and where a ray begins on them; no ray slips through
+        between two triangles. Of hits at the same distance that of the lowest (body, triangle).
 
         Parameters
         ----------

@@ -2,6 +2,8 @@
 //!
 //! Those in `f32` are rounded towards "near" by more than their arithmetic can err.
 
+#![allow(clippy::inline_always, reason = "kernels must be inlined: see `simd`")]
+
 use palpate_geometry::{Aabb, Point, vec3};
 
 use super::Measure;

@@ -24,7 +24,7 @@ struct Node<'a> {
     search: &'a Search<'a>,
     body: u32,
     into: u32,
-    node: u32,
+    index: u32,
     point: Point,
 }
 
@@ -40,7 +40,8 @@ impl Exits {
         found: &mut Vec<PenetratingNode>,
     ) {
         let positions = &search.surfaces.bodies[body as usize].positions;
-        let node = |node: u32| Node { search, body, into, node, point: positions[node as usize] };
+        let node =
+            |index: u32| Node { search, body, into, index, point: positions[index as usize] };
         for &inner in &inside.nodes {
             let node = node(inner);
             let exit = match patch {
@@ -60,7 +61,7 @@ impl Exits {
     fn through_patch(&mut self, node: &Node, patch: &Inside) -> Option<Closest> {
         let body = &node.search.surfaces.bodies[node.body as usize];
         self.normals.clear();
-        for &triangle in body.surface.triangles_of_nodes.around(node.node) {
+        for &triangle in body.surface.triangles_of_nodes.around(node.index) {
             self.normals.extend(unit(triangle_normal(&body.triangle(triangle))));
         }
         let opposite = |triangle: u32, corners: &[Point; 3], found: &PointTriangle, faces: bool| {
@@ -100,7 +101,7 @@ fn swallowed<'a>(nodes: impl Iterator<Item = Node<'a>> + Clone, found: &mut Vec<
         return;
     };
     for node in nodes {
-        if node.node == nearest.node {
+        if node.index == nearest.node {
             found.push(nearest);
         } else if let Some(record) = node.along(nearest.direction) {
             found.push(record);
@@ -122,7 +123,7 @@ impl Node<'_> {
         let surfaces = &self.search.surfaces;
         let triangles = surfaces.bodies[self.into as usize].mesh.triangles();
         let own = |triangle: u32| {
-            self.body == self.into && triangles[triangle as usize].contains(&self.node)
+            self.body == self.into && triangles[triangle as usize].contains(&self.index)
         };
         let mut search = ClosestSearch::new(self.point, within, &self.search.bounds);
         search.body(surfaces, self.into, |triangle, corners, found| {
@@ -136,7 +137,7 @@ impl Node<'_> {
         let into = &self.search.surfaces.bodies[self.into as usize];
         let components = &into.surface.components;
         let [node, ..] = into.mesh.triangles()[triangle as usize];
-        self.body != self.into || components[node as usize] != components[self.node as usize]
+        self.body != self.into || components[node as usize] != components[self.index as usize]
     }
 
     fn closest_elsewhere(&self, within: f64) -> Option<Closest> {
@@ -173,7 +174,7 @@ impl Node<'_> {
         direction: Point,
         depth: f64,
     ) -> PenetratingNode {
-        let Self { body, node, into: into_body, .. } = *self;
+        let Self { body, index: node, into: into_body, .. } = *self;
         PenetratingNode { body, node, into_body, triangle, weights, direction, depth }
     }
 }

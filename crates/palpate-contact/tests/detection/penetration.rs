@@ -124,7 +124,9 @@ fn components(scene: &Scene, body: usize) -> Vec<u32> {
         let before = labels.clone();
         for nodes in scene.mesh(body).triangles() {
             let least = nodes.map(|node| labels[node as usize]).into_iter().min().expect("three");
-            nodes.iter().for_each(|&node| labels[node as usize] = least);
+            for &node in nodes {
+                labels[node as usize] = least;
+            }
         }
         if labels == before {
             return labels;
@@ -425,8 +427,8 @@ fn nodes_inside_their_own_body_are_found() {
 }
 
 /// The nodes of two bodies in each other.
-fn depths(blocks: [Arc<Mesh>; 2]) -> Vec<PenetratingNode> {
-    let mut scene = scene(&blocks, SceneOptions::default());
+fn depths(blocks: &[Arc<Mesh>; 2]) -> Vec<PenetratingNode> {
+    let mut scene = scene(blocks, SceneOptions::default());
     scene.penetration(&|a, b| a != b).nodes.clone()
 }
 
@@ -436,11 +438,11 @@ fn a_box_leaves_the_way_it_came() {
     for depth in [0.3, 1.2, 3.7] {
         let under = block([4, 4, 4], |p| p);
         let upper = block([2, 2, 4], |[x, y, z]| [0.07 + 0.5 * x, 1.3 + 0.5 * y, z + 4.0 - depth]);
-        let found = depths([under, upper]);
+        let found = depths(&[under, upper]);
         let of_upper: Vec<_> = found.iter().filter(|node| node.body == 1).collect();
         assert!(of_upper.len() >= 9);
         for node in of_upper {
-            let z = (node.node % 5) as f64;
+            let z = f64::from(node.node % 5);
             assert!((node.depth - (depth - z)).abs() < 1e-12, "{node:?}");
             assert!(vec3::distance_squared(node.direction, [0.0, 0.0, 1.0]).sqrt() < 1e-12);
         }
@@ -459,7 +461,7 @@ fn a_thin_plate_pushed_in_deep_does_not_flip() {
         let table = block([8, 8, 2], |[x, y, z]| {
             [0.7 * x - 1.0, 0.7 * y - 1.1, z - 1.0 + part * thick - 1.0]
         });
-        let found = depths([plate, table]);
+        let found = depths(&[plate, table]);
         let bodies = |body| found.iter().filter(move |node| node.body == body);
         assert!(bodies(0).count() == 49 && bodies(1).count() >= 9);
         for body in [0, 1] {
