@@ -62,7 +62,6 @@ class Intersections:
 
 
 @dataclass(frozen=True, eq=False)
-<<<<<<< HEAD
 class Proximity:
     """Surface elements closer than the asked distance, sorted by (kind, bodies, elements).
 
@@ -105,7 +104,9 @@ class Proximity:
     def __repr__(self) -> str:
         edges = int((self.kind == self.EDGE_EDGE).sum())
         return f"Proximity({len(self) - edges} vertex-triangle pairs, {edges} edge-edge pairs)"
-=======
+
+
+@dataclass(frozen=True, eq=False)
 class Penetration:
     """Surface nodes inside bodies, and their way out, sorted; read-only.
 
@@ -159,4 +160,3 @@ class RayHits(ClosestPoints):
 
     ``bodies`` is -1 where a ray misses. ``distances`` (k,) [m] are measured along the rays.
     """
->>>>>>> 5c2f919 (Ask for closest points, containment, rays and penetration from Python)

@@ -213,6 +213,7 @@ class Scene:
     def contact_nodes(self, *, self_contact: bool = True) -> tuple[IndexArray, ...]:
         """Nodes of the triangles that meet, sorted, one array per body: the paper's own output."""
         return self._core.contact_nodes(bool(self_contact))
+
     def penetration(self, *, self_contact: bool = True) -> Penetration:
         """Every surface node strictly inside another body, or inside its own, with its way out.
 
