@@ -1,0 +1,129 @@
+//! Time per tetrahedron of the tissue laws: forces, energy, tangent times vector, stiffness matrix.
+//!
+//! `cargo run --release -p palpate-mechanics --example tissue_cost [cells per edge]`
+#![allow(clippy::print_stdout, dead_code, unreachable_pub)]
+
+// The laws are not public: this compiles them once more.
+#[path = "../src"]
+mod source {
+    pub(crate) mod tissue;
+}
+
+use std::hint::black_box;
+use std::time::Instant;
+
+use palpate_geometry::Point;
+use palpate_solver::BlockMatrix;
+use source::tissue::law::{FibreParameters, Lame, Law};
+use source::tissue::{Tissue, TissueInput, VolumeAveraging};
+
+const ROUNDS: usize = 101;
+
+fn main() {
+    let cells: usize = std::env::args().nth(1).map_or(13, |text| text.parse().expect("a number"));
+    let (rest, tetrahedra) = block(cells);
+    let x: Vec<Point> = rest
+        .iter()
+        .map(|&[x, y, z]| {
+            let (s, c) = (0.8 * z).sin_cos();
+            [1.1 * (c * x - s * y), s * x + c * y + 0.1 * x * z, 0.9 * z + 0.05 * (9.0 * x).sin()]
+        })
+        .collect();
+    println!("{} nodes, {} tetrahedra; ns per tetrahedron", rest.len(), tetrahedra.len());
+    println!("law                          forces            energy   multiply  stiffness");
+    let lame = Lame::new(5_000.0, 0.4);
+    let stiff = Lame::new(5_000.0, 0.49);
+    let fibres = |families| FibreParameters { k1: 3_000.0, k2: 5.0, kappa: 0.1, families };
+    let laws = [
+        ("corotated", Law::Corotated(lame), 0.0),
+        ("St. Venant-Kirchhoff", Law::SaintVenantKirchhoff(lame), 0.0),
+        ("neo-Hookean", Law::NeoHookean(lame), 0.0),
+        ("neo-Hookean, viscous", Law::NeoHookean(lame), 0.01),
+        ("neo-Hookean, nu 0.49", Law::NeoHookean(stiff), 0.0),
+        ("Mooney-Rivlin", Law::MooneyRivlin { c10: 800.0, c01: 200.0, lambda: 8_000.0 }, 0.0),
+        ("fibres, 1 family", Law::HolzapfelGasserOgden { matrix: lame, fibres: fibres(1) }, 0.0),
+        ("fibres, 2 families", Law::HolzapfelGasserOgden { matrix: lame, fibres: fibres(2) }, 0.0),
+    ];
+    let directions = vec![[[0.6, 0.0, 0.8], [0.0, 0.6, 0.8]]; tetrahedra.len()];
+    for (name, law, viscosity) in laws {
+        let mut tissue = Tissue::new(&TissueInput {
+            rest: &rest,
+            tetrahedra: &tetrahedra,
+            laws: &[law],
+            regions: &[],
+            fibres: &directions,
+            viscosity,
+            averaging: VolumeAveraging::Automatic,
+        });
+        tissue.begin_step(&rest, 0.01);
+        let mut out = vec![[0.0; 3]; rest.len()];
+        let mut stiffness = BlockMatrix::zeros(tissue.pattern().clone());
+        let per_element = 1e9 / tetrahedra.len() as f64;
+        let forces =
+            measure(ROUNDS, || tissue.forces(black_box(&x), &mut out)).map(|t| t * per_element);
+        let energy = measure(ROUNDS, || {
+            black_box(tissue.energy(black_box(&x)));
+        });
+        let multiply = measure(ROUNDS, || tissue.multiply(black_box(&x), &rest, &mut out));
+        let matrix = measure(5, || tissue.add_stiffness(black_box(&x), &mut stiffness));
+        println!(
+            "{name:24} {:7.1} ({:.1} ..{:5.1}) {:9.1} {:9.1} {:9.1}",
+            forces[1],
+            forces[0],
+            forces[2],
+            energy[1] * per_element,
+            multiply[1] * per_element,
+            matrix[1] * per_element
+        );
+        black_box(&out);
+    }
+}
+
+/// Lower quartile, median and upper quartile of the time of a call [s].
+fn measure(rounds: usize, mut call: impl FnMut()) -> [f64; 3] {
+    let mut times: Vec<f64> = (0..rounds)
+        .map(|_| {
+            let start = Instant::now();
+            call();
+            start.elapsed().as_secs_f64()
+        })
+        .collect();
+    times.sort_by(f64::total_cmp);
+    [rounds / 4, rounds / 2, 3 * rounds / 4].map(|place| times[place])
+}
+
+/// A unit cube of `cells`³ cells of six tetrahedra.
+fn block(cells: usize) -> (Vec<Point>, Vec<[u32; 4]>) {
+    let nodes = cells + 1;
+    let mut rest = Vec::new();
+    for index in 0..nodes.pow(3) {
+        let [i, j, k] = [index / (nodes * nodes), index / nodes % nodes, index % nodes];
+        rest.push([i, j, k].map(|value| value as f64 / cells as f64));
+    }
+    let mut tetrahedra = Vec::new();
+    for cell in 0..cells.pow(3) {
+        let place = [cell / (cells * cells), cell / cells % cells, cell % cells];
+        for (order, odd) in [
+            ([0, 1, 2], false),
+            ([1, 2, 0], false),
+            ([2, 0, 1], false),
+            ([0, 2, 1], true),
+            ([2, 1, 0], true),
+            ([1, 0, 2], true),
+        ] {
+            let mut corner = place;
+            let mut corners = [0; 4];
+            for step in 0..4 {
+                corners[step] = ((corner[0] * nodes + corner[1]) * nodes + corner[2]) as u32;
+                if step < 3 {
+                    corner[order[step]] += 1;
+                }
+            }
+            if odd {
+                corners.swap(2, 3);
+            }
+            tetrahedra.push(corners);
+        }
+    }
+    (rest, tetrahedra)
+}

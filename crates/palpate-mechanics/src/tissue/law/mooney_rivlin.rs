@@ -1,0 +1,58 @@
+//! Mooney-Rivlin, compressible:
+//! `W = c10 (I₁ - 3) + c01 (I₂ - 3) - (2 c10 + 4 c01)(J - 1) + l/2 (J - 1)²`, `I₂ = |cof F|²`,
+//!
+//! with `l = lambda + 2 c10`, so that small strains agree with `mu = 2 (c10 + c01)` and lambda.
+//!
+//! Source: Mooney, J. Appl. Phys. 11 (1940); Rivlin, Phil. Trans. A 241 (1948). The volumetric term is
+//! that of Ciarlet, Geymonat (1982) with the barrier ln J replaced by its tangent, as Smith, de Goes,
+//! Kim (2018) do for neo-Hookean: finite for every F, and polyconvex for c10, c01, l >= 0.
+
+use super::super::matrix::{self, Matrix};
+use super::super::real::Real;
+use super::{Directions, ElementLaw};
+
+#[derive(Clone, Copy)]
+pub(in super::super) struct MooneyRivlin {
+    c10: f64,
+    c01: f64,
+    bulk: f64,
+}
+
+impl MooneyRivlin {
+    pub(in super::super) fn new(c10: f64, c01: f64, lambda: f64) -> Self {
+        Self { c10, c01, bulk: lambda + 2.0 * c10 }
+    }
+
+    fn rest_pressure(&self) -> f64 {
+        2.0 * self.c10 + 4.0 * self.c01
+    }
+}
+
+impl ElementLaw for MooneyRivlin {
+    const FAMILIES: usize = 0;
+
+    #[inline(always)]
+    fn energy<R: Real>(&self, f: &Matrix<R>, _: &Directions<R>) -> R {
+        let like = f[0][0];
+        let (one, three) = (like.splat(1.0), like.splat(3.0));
+        let cofactor = matrix::cofactor(f);
+        let change = matrix::determinant(f, &cofactor) - one;
+        like.splat(self.c10) * (matrix::dot(f, f) - three)
+            + like.splat(self.c01) * (matrix::dot(&cofactor, &cofactor) - three)
+            + change * (like.splat(0.5 * self.bulk) * change - like.splat(self.rest_pressure()))
+    }
+
+    #[inline(always)]
+    fn stress<R: Real>(&self, f: &Matrix<R>, _: &Directions<R>) -> Matrix<R> {
+        let like = f[0][0];
+        let cofactor = matrix::cofactor(f);
+        let change = matrix::determinant(f, &cofactor) - like.splat(1.0);
+        // The derivative of |cof F|² is 2 (I₁ F - F FᵀF).
+        let square = matrix::transpose_multiply(f, f);
+        let two_c01 = like.splat(2.0 * self.c01);
+        let along_f = like.splat(2.0 * self.c10) + two_c01 * matrix::trace(&square);
+        let along_cofactor = like.splat(self.bulk) * change - like.splat(self.rest_pressure());
+        let second = matrix::add_diagonal(&matrix::scale(-two_c01, &square), along_f);
+        matrix::add(&matrix::multiply(f, &second), &matrix::scale(along_cofactor, &cofactor))
+    }
+}

@@ -1,0 +1,9 @@
+//! What the laws and their forces must keep.
+
+mod bending;
+mod body;
+mod closed_forms;
+mod laws;
+mod rotation;
+mod support;
+mod twin;

@@ -1,0 +1,147 @@
+//! Laws, deformations and bodies for the tests.
+
+use glam::{DMat3, DQuat, DVec3};
+use palpate_geometry::Point;
+use proptest::prelude::*;
+
+use super::super::law::{self, Directions, ElementLaw, FibreParameters, Lame, Law, with_law};
+use super::super::matrix::Matrix;
+use super::super::{Tissue, TissueInput, VolumeAveraging};
+
+pub(super) const YOUNG: f64 = 3_000.0;
+pub(super) const POISSON: f64 = 0.4;
+
+/// Every law, with the same elasticity at small strain (the matrix alone where there are fibres).
+pub(super) fn laws() -> Vec<Law> {
+    let lame = Lame::new(YOUNG, POISSON);
+    let hgo = |kappa, families| Law::HolzapfelGasserOgden {
+        matrix: lame,
+        fibres: FibreParameters { k1: 900.0, k2: 2.0, kappa, families },
+    };
+    vec![
+        Law::Corotated(lame),
+        Law::SaintVenantKirchhoff(lame),
+        Law::NeoHookean(lame),
+        Law::MooneyRivlin { c10: 0.35 * lame.mu, c01: 0.15 * lame.mu, lambda: lame.lambda },
+        hgo(0.0, 1),
+        hgo(0.2, 2),
+    ]
+}
+
+/// Two unit directions that are neither parallel nor along an axis.
+pub(super) const DIRECTIONS: Directions<f64> = [[0.48, 0.6, 0.64], [-0.6, 0.8, 0.0]];
+
+pub(super) fn energy(law: Law, f: DMat3) -> f64 {
+    with_law!(law, law => law.energy(&rows(f), &DIRECTIONS))
+}
+
+pub(super) fn stress(law: Law, f: DMat3) -> DMat3 {
+    stress_along(law, f, &DIRECTIONS)
+}
+
+pub(super) fn stress_along(law: Law, f: DMat3, directions: &Directions<f64>) -> DMat3 {
+    with_law!(law, law => matrix(&law.stress(&rows(f), directions)))
+}
+
+pub(super) fn rows(m: DMat3) -> Matrix<f64> {
+    m.transpose().to_cols_array_2d()
+}
+
+pub(super) fn matrix(m: &Matrix<f64>) -> DMat3 {
+    DMat3::from_cols_array_2d(m).transpose()
+}
+
+pub(super) fn dot(a: DMat3, b: DMat3) -> f64 {
+    a.to_cols_array().iter().zip(b.to_cols_array()).map(|(a, b)| a * b).sum()
+}
+
+pub(super) fn norm(a: DMat3) -> f64 {
+    dot(a, a).sqrt()
+}
+
+/// Entries within ±`size`.
+pub(super) fn matrices(size: f64) -> impl Strategy<Value = DMat3> {
+    prop::array::uniform9(-size..size).prop_map(|m| DMat3::from_cols_array(&m))
+}
+
+pub(super) fn rotations() -> impl Strategy<Value = DMat3> {
+    prop::array::uniform3(-3.0..3.0)
+        .prop_map(|w: [f64; 3]| DMat3::from_quat(DQuat::from_scaled_axis(DVec3::from_array(w))))
+}
+
+/// A block of `cells` cells of size `edge` [m], six tetrahedra each.
+pub(super) fn block(cells: [usize; 3], edge: f64) -> (Vec<Point>, Vec<[u32; 4]>) {
+    let nodes = cells.map(|count| count + 1);
+    let mut rest = Vec::new();
+    for k in 0..nodes[2] {
+        for j in 0..nodes[1] {
+            for i in 0..nodes[0] {
+                rest.push([i, j, k].map(|n| edge * n as f64));
+            }
+        }
+    }
+    let mut tetrahedra = Vec::new();
+    for k in 0..cells[2] {
+        for j in 0..cells[1] {
+            for i in 0..cells[0] {
+                let corner = |b: usize| {
+                    (i + (b & 1) + nodes[0] * (j + (b >> 1 & 1) + nodes[1] * (k + (b >> 2)))) as u32
+                };
+                for path in [[1, 3], [3, 2], [2, 6], [6, 4], [4, 5], [5, 1]] {
+                    tetrahedra.push([0, path[0], path[1], 7].map(corner));
+                }
+            }
+        }
+    }
+    (rest, tetrahedra)
+}
+
+/// A body in two regions, the second one the tetrahedra with an odd index.
+pub(super) struct TestBody {
+    pub(super) rest: Vec<Point>,
+    pub(super) tetrahedra: Vec<[u32; 4]>,
+    pub(super) regions: Vec<u32>,
+    pub(super) fibres: Vec<Directions<f64>>,
+    pub(super) laws: [Law; 2],
+    pub(super) viscosity: f64,
+}
+
+impl TestBody {
+    /// `shift` moves the rest nodes, as fractions of a cell, again from the start when it ends.
+    pub(super) fn new(laws: [Law; 2], viscosity: f64, shift: &[f64]) -> Self {
+        let (mut rest, tetrahedra) = block([2, 2, 1], 0.1);
+        for (value, shift) in rest.as_flattened_mut().iter_mut().zip(shift.iter().cycle()) {
+            *value += 0.1 * shift;
+        }
+        let regions = (0..tetrahedra.len() as u32).map(|index| index % 2).collect();
+        let fibres = (0..tetrahedra.len())
+            .map(|index| {
+                let turn = DMat3::from_rotation_z(0.3 * index as f64);
+                DIRECTIONS.map(|d| (turn * DVec3::from_array(d)).to_array())
+            })
+            .collect();
+        Self { rest, tetrahedra, regions, fibres, laws, viscosity }
+    }
+
+    pub(super) fn tissue(&self, averaging: VolumeAveraging) -> Tissue {
+        Tissue::new(&TissueInput {
+            rest: &self.rest,
+            tetrahedra: &self.tetrahedra,
+            laws: &self.laws,
+            regions: &self.regions,
+            fibres: &self.fibres,
+            viscosity: self.viscosity,
+            averaging,
+        })
+    }
+}
+
+/// `x + factor d` for every node.
+pub(super) fn moved(x: &[Point], factor: f64, d: &[Point]) -> Vec<Point> {
+    let pairs = x.iter().zip(d);
+    pairs.map(|(x, d)| std::array::from_fn(|axis| x[axis] + factor * d[axis])).collect()
+}
+
+pub(super) fn inner(a: &[Point], b: &[Point]) -> f64 {
+    a.as_flattened().iter().zip(b.as_flattened()).map(|(a, b)| a * b).sum()
+}
