@@ -62,12 +62,15 @@ impl Task for Stiffness<'_> {
     }
 
     fn finish_group(&mut self, _: &Group) {
-        for (places, values) in self.places[self.group].iter().zip(&self.values) {
-            for (lane, place) in places.iter().enumerate() {
+        for (pair, [row, col]) in PAIRS.into_iter().enumerate() {
+            let values = &self.values[pair];
+            for (lane, place) in self.places[self.group][pair].iter().enumerate() {
                 let block = &mut self.blocks[place.index as usize];
                 for a in 0..3 {
                     for b in 0..3 {
-                        let value = if place.transposed { values[b][a] } else { values[a][b] };
+                        // Diagonal blocks are symmetric to the last bit.
+                        let turned = if row == col { b < a } else { place.transposed };
+                        let value = if turned { values[b][a] } else { values[a][b] };
                         block[a][b] += value[lane];
                     }
                 }
