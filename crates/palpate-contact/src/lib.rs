@@ -46,6 +46,6 @@ pub use bounding_tree::{BoundingTree, Split, TreeDefect, TreeStats};
 pub use pairs::{PairKind, PenetratingNode, ProximityPair, TrianglePair};
 pub use points::SurfacePoint;
 pub use scene::{
-    ContactNodes, DetectionStats, IntersectionOptions, Intersections, Method, Penetration,
-    Proximity, ProximityOptions, Scene, SceneError, SceneOptions, UpdateStats,
+    ContactNodes, DetectionMemory, DetectionStats, IntersectionOptions, Intersections, Method,
+    Penetration, Proximity, ProximityOptions, Scene, SceneError, SceneOptions, UpdateStats,
 };

@@ -12,7 +12,9 @@ use palpate_geometry::Aabb;
 use rayon::ThreadPool;
 
 use crate::proximity::Limit;
-use crate::scene::{Frame, IntersectionOptions, Intersections, Proximity, SceneBody};
+use crate::scene::{
+    DetectionMemory, Frame, IntersectionOptions, Intersections, Proximity, SceneBody,
+};
 use crate::wide::WideSurface;
 
 /// How touching surface elements are found. All give the same pairs.
@@ -63,6 +65,11 @@ pub(crate) trait Detector: Debug + Send + Sync {
     /// nodes or blocks that were refitted for it.
     fn bodies_moved(&mut self, _bodies: &[SceneBody], _pool: Option<&ThreadPool>) -> u64 {
         0
+    }
+
+    /// What it keeps in memory; the number of triangles is not its to say.
+    fn memory(&self) -> DetectionMemory {
+        DetectionMemory::default()
     }
 
     /// A box around a body at least as large as its own; `None` where its tree must say.

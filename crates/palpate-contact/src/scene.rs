@@ -2,6 +2,7 @@
 
 mod error;
 mod lazy_tree;
+mod memory;
 mod options;
 mod points;
 mod results;
@@ -27,6 +28,7 @@ pub use crate::method::Method;
 use lazy_tree::LazyTree;
 
 pub use error::SceneError;
+pub use memory::DetectionMemory;
 pub use options::{IntersectionOptions, ProximityOptions, SceneOptions};
 pub use results::{
     ContactNodes, DetectionStats, Intersections, Penetration, Proximity, UpdateStats,

@@ -24,14 +24,15 @@ use palpate_geometry::Point;
 use palpate_model::Mesh;
 use palpate_model::mesh::NONE;
 
+use crate::scene::DetectionMemory;
 use crate::simd::Isa;
-use adjacency::Adjacency;
+use adjacency::{Adjacency, Incidence};
 pub(crate) use boxes::Block;
 pub(crate) use features::{EdgePairs, VertexPairs};
 pub(crate) use hierarchy::Hierarchy;
 pub(crate) use nearest::{BlockMeasure, WideSurface};
 pub(crate) use separation::{Reach, SeparateTriangles};
-pub(crate) use traverse::{Sides, Traversal};
+pub(crate) use traverse::{Sides, Traversal, bytes};
 
 /// Elements of a block, and children of a block of the hierarchy.
 pub(crate) const WIDTH: usize = 8;
@@ -47,9 +48,9 @@ pub(crate) struct WideBody {
     surface_nodes: Vec<u32>,
     /// Positions of the surface nodes less the frame's origin; the fourth number is padding.
     nodes: Vec<[f32; 4]>,
-    pub(crate) triangles: Hierarchy,
-    pub(crate) edges: Hierarchy,
-    pub(crate) points: Hierarchy,
+    pub(crate) triangles: Hierarchy<3>,
+    pub(crate) edges: Hierarchy<2>,
+    pub(crate) points: Hierarchy<1>,
     triangles_of_triangles: Adjacency,
     edges_of_edges: Adjacency,
     triangles_of_points: Adjacency,
@@ -69,22 +70,24 @@ impl WideBody {
         for (index, &node) in surface_nodes.iter().enumerate() {
             local[node as usize] = index as u32;
         }
-        let element = |corners: [u32; 3]| corners.map(|node| local[node as usize]);
-        let triangles: Vec<_> = mesh.triangles().iter().map(|&corners| element(corners)).collect();
-        let edges: Vec<_> = mesh.surface_edges().iter().map(|&[a, b]| element([a, b, b])).collect();
-        let points: Vec<_> = surface_nodes.iter().map(|&node| element([node; 3])).collect();
-        let local_positions: Vec<Point> = surface_nodes.iter().map(|&node| at(node)).collect();
-        let hierarchy = |elements: &[[u32; 3]]| Hierarchy::new(elements, &local_positions);
-        let (triangles, edges) = (hierarchy(&triangles), hierarchy(&edges));
-        let points = Hierarchy::in_order(&points);
+        let local = |node: u32| local[node as usize];
+        let triangles: Vec<_> = mesh.triangles().iter().map(|nodes| nodes.map(local)).collect();
+        let edges: Vec<_> = mesh.surface_edges().iter().map(|nodes| nodes.map(local)).collect();
+        let positions: Vec<Point> = surface_nodes.iter().map(|&node| at(node)).collect();
+        let (triangles, edges) =
+            (Hierarchy::new(&triangles, &positions), Hierarchy::new(&edges, &positions));
         let node_count = surface_nodes.len();
+        let points = Hierarchy::in_order((0..node_count as u32).map(|node| [node]).collect());
+        let of_triangles = (&triangles, &Incidence::new(&triangles, node_count));
+        let of_edges = (&edges, &Incidence::new(&edges, node_count));
+        let of_points = (&points, &Incidence::new(&points, node_count));
         Self {
             mesh: Arc::clone(mesh),
             nodes: vec![[0.0; 4]; node_count],
             surface_nodes,
-            triangles_of_triangles: Adjacency::new(&triangles, &triangles, true, node_count),
-            edges_of_edges: Adjacency::new(&edges, &edges, true, node_count),
-            triangles_of_points: Adjacency::new(&points, &triangles, false, node_count),
+            triangles_of_triangles: Adjacency::new(of_triangles, of_triangles, true),
+            edges_of_edges: Adjacency::new(of_edges, of_edges, true),
+            triangles_of_points: Adjacency::new(of_points, of_triangles, false),
             triangles,
             edges,
             points,
@@ -117,20 +120,31 @@ impl WideBody {
         }
     }
 
+    /// Adds what this keeps in memory.
+    pub(crate) fn add_memory(&self, sum: &mut DetectionMemory) {
+        let Self { surface_nodes, nodes, triangles, edges, points, .. } = self;
+        sum.nodes += size_of_val(surface_nodes.as_slice()) + size_of_val(nodes.as_slice());
+        sum.elements += triangles.slot_bytes() + edges.slot_bytes() + points.slot_bytes();
+        sum.triangle_boxes += triangles.boxes.bytes();
+        sum.feature_boxes += edges.boxes.bytes() + points.boxes.bytes();
+        sum.triangle_masks += self.triangles_of_triangles.bytes();
+        sum.feature_masks += self.edges_of_edges.bytes() + self.triangles_of_points.bytes();
+    }
+
     /// Triangles of two bodies, which may be the same, further apart than `margin` being of no use;
     /// likewise edges, and the nodes of a against the triangles of b.
     pub(crate) fn triangles_and_triangles<'a>(&'a self, b: &'a Self, margin: f64) -> Sides<'a> {
         let own = std::ptr::eq(self, b).then_some(&self.triangles_of_triangles);
-        Sides::new([&self.triangles, &b.triangles], own, own.is_some(), margin)
+        Sides::new([&self.triangles.boxes, &b.triangles.boxes], own, own.is_some(), margin)
     }
 
     pub(crate) fn edges_and_edges<'a>(&'a self, b: &'a Self, margin: f64) -> Sides<'a> {
         let own = std::ptr::eq(self, b).then_some(&self.edges_of_edges);
-        Sides::new([&self.edges, &b.edges], own, own.is_some(), margin)
+        Sides::new([&self.edges.boxes, &b.edges.boxes], own, own.is_some(), margin)
     }
 
     pub(crate) fn points_and_triangles<'a>(&'a self, b: &'a Self, margin: f64) -> Sides<'a> {
         let own = std::ptr::eq(self, b).then_some(&self.triangles_of_points);
-        Sides::new([&self.points, &b.triangles], own, false, margin)
+        Sides::new([&self.points.boxes, &b.triangles.boxes], own, false, margin)
     }
 }

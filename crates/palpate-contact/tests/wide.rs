@@ -145,3 +145,35 @@ fn bodies_come_and_go() {
         assert_eq!(&wide.intersections(&IntersectionOptions::default()).pairs, expected);
     }
 }
+
+/// Bytes of the layout per surface triangle, the promised most.
+const BYTES_PER_TRIANGLE: f64 = 160.0;
+
+#[test]
+fn the_layout_keeps_its_promise_of_memory() {
+    let mut random = Random(31);
+    // Loose triangles have twice the edges and six times the nodes, and no neighbours: no limit there.
+    let sets = [
+        vec![horseshoe(60, 8, [0.0; 3]), horseshoe(30, 8, [5.0, 0.0, 0.0])],
+        vec![jittered([20, 20, 20], [0.0; 3], 0.2, &mut random)],
+    ];
+    for meshes in sets {
+        let triangle_count = meshes.iter().map(|mesh| mesh.triangles().len()).sum();
+        let mut scene = Scene::new(meshes, None, SceneOptions::default()).expect("meshes");
+        let new = scene.memory();
+        assert!(new.layout_per_triangle() <= BYTES_PER_TRIANGLE, "{new:?}");
+        assert_eq!(new.triangle_count, triangle_count);
+        let parts = [new.nodes, new.elements, new.triangle_boxes, new.feature_boxes];
+        let masks = [new.triangle_masks, new.feature_masks];
+        assert_eq!(parts.iter().chain(&masks).sum::<usize>(), new.layout());
+        // A triangle's box alone is six numbers of four bytes.
+        assert!(parts.iter().chain(&masks).all(|&part| part > 0));
+        assert!(new.triangle_boxes >= 24 * triangle_count);
+        // What is found changes the buffers only.
+        scene.intersections(&IntersectionOptions::default());
+        scene.proximity(&|_, _| Some(0.3));
+        let used = scene.memory();
+        assert!(used.buffers > new.buffers);
+        assert_eq!(used.layout(), new.layout());
+    }
+}

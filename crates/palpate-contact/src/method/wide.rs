@@ -13,11 +13,13 @@ use crate::neighbours::neighbours_meet;
 use crate::pairs::{ProximityPair, TrianglePair};
 use crate::proximity::{edge_pair, sort, vertex_triangle};
 use crate::scene::{
-    DetectionStats, Frame, IntersectionOptions, Intersections, Proximity, SceneBody,
+    DetectionMemory, DetectionStats, Frame, IntersectionOptions, Intersections, Proximity,
+    SceneBody,
 };
 use crate::simd::Isa;
 use crate::wide::{
     EdgePairs, Reach, SeparateTriangles, Sides, Traversal, VertexPairs, WideBody, WideSurface,
+    bytes,
 };
 
 /// Block pairs of the upper levels in a task.
@@ -130,6 +132,13 @@ impl<T> Default for Worker<T> {
     }
 }
 
+impl<T> Worker<T> {
+    fn bytes(&self) -> usize {
+        let Self { traversal, candidates, groups, kept, found, .. } = self;
+        traversal.bytes() + bytes(candidates) + bytes(groups) + bytes(kept) + bytes(found)
+    }
+}
+
 /// The candidates of one task.
 #[derive(Clone, Copy, Debug)]
 struct Group {
@@ -225,11 +234,24 @@ impl Detector for Wide {
         } else {
             self.bodies.iter_mut().zip(bodies).for_each(refit);
         }
-        self.bodies.iter().map(|body| body.triangles.block_count()).sum()
+        self.bodies.iter().map(|body| body.triangles.boxes.block_count()).sum()
+    }
+
+    fn memory(&self) -> DetectionMemory {
+        let mut sum = DetectionMemory::default();
+        self.bodies.iter().for_each(|body| body.add_memory(&mut sum));
+        sum.buffers = bytes(&self.objects)
+            + bytes(&self.searches)
+            + self.splitting.bytes()
+            + bytes(&self.seeds)
+            + bytes(&self.tasks)
+            + self.meeting.iter().map(Worker::bytes).sum::<usize>()
+            + self.close.iter().map(Worker::bytes).sum::<usize>();
+        sum
     }
 
     fn bounds(&self, body: usize) -> Option<Aabb> {
-        let [min, max] = self.bodies[body].triangles.bounds()?;
+        let [min, max] = self.bodies[body].triangles.boxes.bounds()?;
         let shifted = |value: f32, axis: usize| f64::from(value) + self.origin[axis];
         // One step further out: the sum is rounded.
         Some(Aabb {

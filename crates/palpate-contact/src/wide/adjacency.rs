@@ -1,6 +1,6 @@
 //! What the connectivity of a surface decides once and for all: which pairs of elements share a node.
 
-use palpate_model::mesh::NONE;
+use std::ops::Range;
 
 use super::{Hierarchy, WIDTH};
 
@@ -14,81 +14,254 @@ pub(crate) const UPPER: u64 = {
     mask
 };
 
+/// In [`Adjacency::seconds`]: the first pair of a block of a.
+const NEW_ROW: u32 = 1 << 31;
+
+/// After so many pairs the rows so far are written down.
+const STRIDE: usize = 64;
+
 /// Pairs of blocks of one body that have a node in common: of one kind of elements with itself, or of
 /// two kinds.
+///
+/// The pairs stand in the order of a, and every block of a occurs; of one kind with itself a <= b, each
+/// block with itself included.
 #[derive(Debug, Default)]
 pub(crate) struct Adjacency {
-    /// The pairs, sorted; of one kind with itself a <= b, each block with itself included.
-    pub(crate) pairs: Vec<[u32; 2]>,
+    /// Per pair: the second block, and [`NEW_ROW`].
+    seconds: Vec<u32>,
+    /// Blocks of a that occur before every [`STRIDE`] pairs.
+    rows: Vec<u32>,
     /// Per pair: the lane pairs that share no node; within one block those with i < j.
-    pub(crate) apart: Vec<u64>,
-    /// Rows of `parents`, by block of level 1.
+    pub(super) apart: Vec<u64>,
+    /// Rows of the two below, by block of level 1.
     parent_rows: Vec<u32>,
-    /// Pairs of blocks of level 1 as (second block, child pairs that are in `pairs`).
-    pub(super) parents: Vec<(u32, u64)>,
+    /// Per pair of blocks of level 1: the second, and the child pairs that are neighbours.
+    parents: Vec<u32>,
+    child_pairs: Vec<u64>,
 }
 
 impl Adjacency {
     /// `same`: whether a and b are one and the same.
-    pub(super) fn new(a: &Hierarchy, b: &Hierarchy, same: bool, node_count: usize) -> Self {
-        let (node_rows, node_slots) = slots_of_nodes(&b.slots, node_count);
-        let (blocks_a, _) = a.slots.as_chunks::<WIDTH>();
-        let (blocks_b, _) = b.slots.as_chunks::<WIDTH>();
+    pub(super) fn new<const A: usize, const B: usize>(
+        (a, of_a): (&Hierarchy<A>, &Incidence),
+        (b, of_b): (&Hierarchy<B>, &Incidence),
+        same: bool,
+    ) -> Self {
         let mut adjacency = Self::default();
-        let mut row: Vec<(u32, u64)> = Vec::new();
-        for (a, block) in blocks_a.iter().enumerate() {
-            row.clear();
-            for (i, slot) in block.iter().enumerate().filter(|(_, slot)| slot[3] != NONE) {
-                for &node in &slot[..3] {
-                    let [start, end] = [node_rows[node as usize], node_rows[node as usize + 1]];
-                    for &other in &node_slots[start as usize..end as usize] {
-                        let (b, j) = (other / WIDTH as u32, other as usize % WIDTH);
-                        if !same || b as usize >= a {
-                            set(&mut row, b, i * WIDTH + j);
-                        }
+        let mut row = Row::new(b.boxes.level(0).len());
+        let mut parents = Row::new(b.boxes.level(1).len());
+        // The last block that a node was seen in, plus one.
+        let mut seen = vec![0; of_a.rows.len()];
+        let (blocks, _) = a.corners.as_chunks::<WIDTH>();
+        for (first, corners) in blocks.iter().enumerate() {
+            for &node in corners.as_flattened() {
+                let last = std::mem::replace(&mut seen[node as usize], first as u32 + 1);
+                if last == first as u32 + 1 {
+                    continue;
+                }
+                let lanes_a = of_a.lanes(node, first as u32);
+                for &(second, lanes_b) in of_b.blocks(node) {
+                    if !same || second >= first as u32 {
+                        row.add(second, products(lanes_a, lanes_b));
                     }
                 }
             }
-            row.sort_unstable();
-            for &(b, sharing) in &row {
-                let mut apart = valid_lanes(block, &blocks_b[b as usize]) & !sharing;
-                if same && b as usize == a {
+            for (i, &(second, sharing)) in row.entries.iter().enumerate() {
+                let mut apart = products(a.lanes(first), b.lanes(second as usize)) & !sharing;
+                if same && second as usize == first {
                     apart &= UPPER;
                 }
-                adjacency.pairs.push([a as u32, b]);
+                if adjacency.seconds.len().is_multiple_of(STRIDE) {
+                    adjacency.rows.push(first as u32 + u32::from(i > 0));
+                }
+                adjacency.seconds.push(second | if i == 0 { NEW_ROW } else { 0 });
                 adjacency.apart.push(apart);
+                let bit = first % WIDTH * WIDTH + second as usize % WIDTH;
+                parents.add(second / WIDTH as u32, 1 << bit);
+            }
+            row.clear();
+            if first % WIDTH == WIDTH - 1 || first + 1 == blocks.len() {
+                adjacency.push_parents(&mut parents);
             }
         }
-        adjacency.collect_parents(blocks_a.len());
+        adjacency.parent_rows.push(adjacency.parents.len() as u32);
         adjacency
     }
 
-    fn collect_parents(&mut self, block_count: usize) {
-        let mut row: Vec<(u32, u64)> = Vec::new();
-        let mut next = 0;
-        for parent in 0..block_count.div_ceil(WIDTH) {
-            self.parent_rows.push(self.parents.len() as u32);
-            row.clear();
-            while let Some(&[a, b]) = self.pairs.get(next)
-                && a as usize / WIDTH == parent
-            {
-                set(&mut row, b / WIDTH as u32, a as usize % WIDTH * WIDTH + b as usize % WIDTH);
-                next += 1;
-            }
-            row.sort_unstable();
-            self.parents.extend_from_slice(&row);
-        }
+    fn push_parents(&mut self, row: &mut Row) {
         self.parent_rows.push(self.parents.len() as u32);
+        self.parents.extend(row.entries.iter().map(|entry| entry.0));
+        self.child_pairs.extend(row.entries.iter().map(|entry| entry.1));
+        row.clear();
+    }
+
+    /// Number of pairs.
+    pub(super) fn len(&self) -> usize {
+        self.seconds.len()
+    }
+
+    /// Some of the pairs.
+    pub(super) fn pairs(&self, range: Range<usize>) -> impl Iterator<Item = [u32; 2]> {
+        let Seconds { mut rows, seconds } = self.seconds(range);
+        seconds.iter().map(move |&second| {
+            rows += second >> 31;
+            [rows - 1, second & !NEW_ROW]
+        })
+    }
+
+    /// Some of the pairs as they are stored.
+    pub(super) fn seconds(&self, range: Range<usize>) -> Seconds<'_> {
+        let stride = range.start / STRIDE;
+        let written = self.rows.get(stride).copied().unwrap_or_default();
+        let since = &self.seconds[stride * STRIDE..range.start];
+        let rows = since.iter().fold(written, |rows, second| rows + (second >> 31));
+        Seconds { rows, seconds: &self.seconds[range] }
     }
 
     /// The child pairs of two blocks of level 1 that are in `pairs`.
     #[inline]
     pub(super) fn child_pairs(&self, [a, b]: [u32; 2]) -> u64 {
         let [start, end] = [self.parent_rows[a as usize], self.parent_rows[a as usize + 1]];
-        let row = &self.parents[start as usize..end as usize];
-        row.iter().find(|entry| entry.0 == b).map_or(0, |entry| entry.1)
+        let range = start as usize..end as usize;
+        let found = self.parents[range].iter().position(|&parent| parent == b);
+        found.map_or(0, |index| self.child_pairs[start as usize + index])
+    }
+
+    /// Memory in bytes.
+    pub(super) fn bytes(&self) -> usize {
+        let Self { seconds, rows, apart, parent_rows, parents, child_pairs } = self;
+        let indices = [seconds, rows, parent_rows, parents].map(|v| size_of_val(v.as_slice()));
+        let masks = [apart, child_pairs].map(|v| size_of_val(v.as_slice()));
+        indices.iter().chain(&masks).sum()
     }
 }
+
+/// Pairs of blocks, as [`Adjacency`] stores them.
+#[derive(Clone, Copy)]
+pub(super) struct Seconds<'a> {
+    /// Blocks of a that occur before.
+    rows: u32,
+    seconds: &'a [u32],
+}
+
+impl Seconds<'_> {
+    pub(super) fn len(&self) -> usize {
+        self.seconds.len()
+    }
+
+    /// The pair at `index`, and where the next is to begin: for plain loops from zero on.
+    #[inline(always)]
+    pub(super) fn next(&self, index: usize, rows: &mut u32) -> [u32; 2] {
+        let second = self.seconds[index];
+        *rows += second >> 31;
+        [*rows - 1, second & !NEW_ROW]
+    }
+
+    pub(super) fn rows(&self) -> u32 {
+        self.rows
+    }
+}
+
+/// The blocks that each node is a corner in.
+#[derive(Debug)]
+pub(super) struct Incidence {
+    rows: Vec<u32>,
+    /// The block, and in which lanes the node is.
+    blocks: Vec<(u32, u8)>,
+}
+
+impl Incidence {
+    pub(super) fn new<const N: usize>(elements: &Hierarchy<N>, node_count: usize) -> Self {
+        // Per node the last block that was counted, plus one; counts, later rows, two places on.
+        let mut last = vec![0; node_count];
+        let mut rows = vec![0; node_count + 2];
+        let slots = || elements.corners[..elements.count].iter().enumerate();
+        for (slot, corners) in slots() {
+            let block = (slot / WIDTH) as u32 + 1;
+            for &node in corners {
+                if std::mem::replace(&mut last[node as usize], block) != block {
+                    rows[node as usize + 2] += 1;
+                }
+            }
+        }
+        for node in 0..node_count {
+            rows[node + 2] += rows[node + 1];
+        }
+        let mut blocks = vec![(0, 0); rows[node_count + 1] as usize];
+        last.fill(0);
+        for (slot, corners) in slots() {
+            let (block, lane) = ((slot / WIDTH) as u32, slot % WIDTH);
+            for &node in corners {
+                let next = &mut rows[node as usize + 1];
+                if std::mem::replace(&mut last[node as usize], block + 1) != block + 1 {
+                    blocks[*next as usize].0 = block;
+                    *next += 1;
+                }
+                blocks[*next as usize - 1].1 |= 1 << lane;
+            }
+        }
+        rows.pop();
+        Self { rows, blocks }
+    }
+
+    fn blocks(&self, node: u32) -> &[(u32, u8)] {
+        let [start, end] = [self.rows[node as usize], self.rows[node as usize + 1]];
+        &self.blocks[start as usize..end as usize]
+    }
+
+    fn lanes(&self, node: u32, block: u32) -> u8 {
+        let found = self.blocks(node).iter().find(|entry| entry.0 == block);
+        found.map_or(0, |entry| entry.1)
+    }
+}
+
+/// Masks by block, of few of all blocks.
+struct Row {
+    entries: Vec<(u32, u64)>,
+    /// Per block where its entry is, if that one is its.
+    places: Vec<u32>,
+}
+
+impl Row {
+    fn new(block_count: usize) -> Self {
+        Self { entries: Vec::new(), places: vec![0; block_count] }
+    }
+
+    fn add(&mut self, block: u32, mask: u64) {
+        let place = &mut self.places[block as usize];
+        match self.entries.get_mut(*place as usize) {
+            Some(entry) if entry.0 == block => entry.1 |= mask,
+            _ => {
+                *place = self.entries.len() as u32;
+                self.entries.push((block, mask));
+            }
+        }
+    }
+
+    fn clear(&mut self) {
+        self.entries.clear();
+    }
+}
+
+/// Lane pairs (i, j) of lanes i and lanes j.
+fn products(lanes_a: u8, lanes_b: u8) -> u64 {
+    SPREAD[lanes_a as usize] * u64::from(lanes_b)
+}
+
+/// Bit i of the index at 8 i.
+static SPREAD: [u64; 256] = {
+    let mut spread = [0; 256];
+    let mut lanes = 0;
+    while lanes < 256 {
+        let mut lane = 0;
+        while lane < 8 {
+            spread[lanes] |= (lanes as u64 >> lane & 1) << (8 * lane);
+            lane += 1;
+        }
+        lanes += 1;
+    }
+    spread
+};
 
 /// The set bits, ascending.
 pub(crate) fn bits(mut mask: u64) -> impl Iterator<Item = usize> {
@@ -97,41 +270,4 @@ pub(crate) fn bits(mut mask: u64) -> impl Iterator<Item = usize> {
         mask &= mask.wrapping_sub(1);
         (bit < 64).then_some(bit)
     })
-}
-
-fn set(row: &mut Vec<(u32, u64)>, block: u32, bit: usize) {
-    match row.iter_mut().find(|entry| entry.0 == block) {
-        Some(entry) => entry.1 |= 1 << bit,
-        None => row.push((block, 1 << bit)),
-    }
-}
-
-fn valid_lanes(a: &[[u32; 4]; WIDTH], b: &[[u32; 4]; WIDTH]) -> u64 {
-    let lanes = |block: &[[u32; 4]; WIDTH]| {
-        (0..WIDTH).filter(|&i| block[i][3] != NONE).fold(0_u64, |lanes, i| lanes | 1 << i)
-    };
-    (0..WIDTH).filter(|i| lanes(a) >> i & 1 == 1).fold(0, |mask, i| mask | lanes(b) << (8 * i))
-}
-
-/// The slots that each node is a corner of, as rows of one array.
-fn slots_of_nodes(slots: &[[u32; 4]], node_count: usize) -> (Vec<u32>, Vec<u32>) {
-    let mut rows = vec![0; node_count + 1];
-    let real = || slots.iter().enumerate().filter(|(_, slot)| slot[3] != NONE);
-    for (_, slot) in real() {
-        for &node in &slot[..3] {
-            rows[node as usize + 1] += 1;
-        }
-    }
-    for node in 0..node_count {
-        rows[node + 1] += rows[node];
-    }
-    let mut next = rows.clone();
-    let mut result = vec![0; rows[node_count] as usize];
-    for (index, slot) in real() {
-        for &node in &slot[..3] {
-            result[next[node as usize] as usize] = index as u32;
-            next[node as usize] += 1;
-        }
-    }
-    (rows, result)
 }

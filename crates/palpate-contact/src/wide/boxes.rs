@@ -31,15 +31,85 @@ impl Block {
 /// [`f32::MIN_POSITIVE`], away. Twice what a conversion from `f64` needs.
 const ROUNDING: f32 = f32::EPSILON;
 
-/// All levels over `block_count` blocks, their boxes empty.
-pub(super) fn empty_levels(block_count: usize) -> Vec<Vec<Block>> {
-    let mut levels = Vec::new();
-    let mut count = block_count;
-    while count > 0 {
-        levels.push(vec![Block::EMPTY; count]);
-        count = if count == 1 { 0 } else { count.div_ceil(WIDTH) };
+/// Boxes of boxes, eight by eight.
+#[derive(Debug)]
+pub(crate) struct Levels {
+    /// `levels[0]`: boxes of the elements; `levels[k]`: boxes of the blocks of level k - 1. The last
+    /// has one block.
+    levels: Vec<Vec<Block>>,
+    /// A level above the last: everything in lane 0.
+    above: Block,
+}
+
+impl Levels {
+    /// All levels over `block_count` blocks, their boxes empty.
+    pub(super) fn empty(block_count: usize) -> Self {
+        let mut levels = Vec::new();
+        let mut count = block_count;
+        while count > 0 {
+            levels.push(vec![Block::EMPTY; count]);
+            count = if count == 1 { 0 } else { count.div_ceil(WIDTH) };
+        }
+        Self { levels, above: Block::EMPTY }
     }
-    levels
+
+    /// Number of levels; zero without elements.
+    pub(crate) fn depth(&self) -> usize {
+        self.levels.len()
+    }
+
+    /// Blocks of level `k`, of any k.
+    pub(super) fn level(&self, k: usize) -> &[Block] {
+        self.levels.get(k).map_or(std::slice::from_ref(&self.above), Vec::as_slice)
+    }
+
+    /// Number of blocks of all levels.
+    pub(crate) fn block_count(&self) -> u64 {
+        self.levels.iter().map(|level| level.len() as u64).sum()
+    }
+
+    pub(super) fn bytes(&self) -> usize {
+        let levels = self.levels.iter().map(|level| size_of_val(level.as_slice()));
+        levels.sum::<usize>() + size_of::<Block>()
+    }
+
+    /// Lower and upper corner of a box around everything; `None` where that exceeds `f32`, or nothing is
+    /// there.
+    pub(crate) fn bounds(&self) -> Option<[[f32; 3]; 2]> {
+        let bounds = [self.above.min, self.above.max].map(|side| side.map(|axis| axis[0]));
+        bounds.as_flattened().iter().all(|value| value.abs() < f32::MAX).then_some(bounds)
+    }
+
+    /// At least the largest coordinate; infinite where `f32` ends.
+    pub(super) fn largest_coordinate(&self) -> f32 {
+        let largest = |bounds: [[f32; 3]; 2]| {
+            bounds.as_flattened().iter().fold(0.0, |largest: f32, value| largest.max(value.abs()))
+        };
+        self.bounds().map_or(f32::INFINITY, largest)
+    }
+
+    /// Recomputes the boxes of `count` elements, whose nodes the `corners` name, pads included, and all
+    /// above.
+    pub(super) fn refit<const N: usize>(
+        &mut self,
+        isa: Isa,
+        nodes: &[[f32; 4]],
+        corners: &[[u32; N]],
+        count: usize,
+    ) {
+        let Some((blocks, mut parents)) = self.levels.split_first_mut() else {
+            return;
+        };
+        isa.run(RefitElements { nodes, corners, blocks });
+        empty_pads(count, blocks);
+        let mut children: &[Block] = blocks;
+        while let Some((level, rest)) = parents.split_first_mut() {
+            isa.run(RefitParents { children, parents: level });
+            children = level;
+            parents = rest;
+        }
+        isa.run(RefitParents { children, parents: std::slice::from_mut(&mut self.above) });
+    }
 }
 
 /// Positions relative to `origin` in `f32`, of either sign at most [`f32::MAX`].
@@ -58,59 +128,39 @@ pub(super) fn narrow(
     }
 }
 
-/// Recomputes all levels.
-pub(super) fn refit(
-    isa: Isa,
-    nodes: &[[f32; 4]],
-    slots: &[[u32; 4]],
-    levels: &mut [Vec<Block>],
-    above: &mut Block,
-) {
-    let Some((blocks, mut parents)) = levels.split_first_mut() else {
-        return;
-    };
-    isa.run(RefitTriangles { nodes, slots, blocks });
-    empty_pads(slots, blocks);
-    let mut children: &[Block] = blocks;
-    while let Some((level, rest)) = parents.split_first_mut() {
-        isa.run(RefitParents { children, parents: level });
-        children = level;
-        parents = rest;
-    }
-    isa.run(RefitParents { children, parents: std::slice::from_mut(above) });
-}
-
-fn empty_pads(slots: &[[u32; 4]], blocks: &mut [Block]) {
-    let (Some(last), Some(block)) = (slots.last_chunk::<WIDTH>(), blocks.last_mut()) else {
-        return;
-    };
-    for (lane, slot) in last.iter().enumerate() {
-        if slot[3] == palpate_model::mesh::NONE {
-            for axis in 0..3 {
-                block.min[axis][lane] = f32::INFINITY;
-                block.max[axis][lane] = f32::NEG_INFINITY;
-            }
+fn empty_pads(count: usize, blocks: &mut [Block]) {
+    if let Some(block) = blocks.get_mut(count / WIDTH) {
+        for axis in 0..3 {
+            block.min[axis][count % WIDTH..].fill(f32::INFINITY);
+            block.max[axis][count % WIDTH..].fill(f32::NEG_INFINITY);
         }
     }
 }
 
-struct RefitTriangles<'a> {
+struct RefitElements<'a, const N: usize> {
     nodes: &'a [[f32; 4]],
-    slots: &'a [[u32; 4]],
+    corners: &'a [[u32; N]],
     blocks: &'a mut [Block],
 }
 
-impl Kernel for RefitTriangles<'_> {
+impl<const N: usize> Kernel for RefitElements<'_, N> {
     type Output = ();
 
     #[inline(always)]
     fn run<L: Lanes>(self) {
-        let (slots, _) = self.slots.as_chunks::<WIDTH>();
+        let (slots, _) = self.corners.as_chunks::<WIDTH>();
         for (slots, block) in slots.iter().zip(self.blocks) {
-            let [a, b, c] = corners::<L>(self.nodes, slots);
+            let mut min: [L; 3] = gather(self.nodes, slots, 0);
+            let mut max = min;
+            for corner in 1..N {
+                let node: [L; 3] = gather(self.nodes, slots, corner);
+                for axis in 0..3 {
+                    min[axis] = min[axis].min(node[axis]);
+                    max[axis] = max[axis].max(node[axis]);
+                }
+            }
             for axis in 0..3 {
-                let min = a[axis].min(b[axis]).min(c[axis]);
-                let max = a[axis].max(b[axis]).max(c[axis]);
+                let (min, max) = (min[axis], max[axis]);
                 at_least_lowest(min.sub(rounding(min))).store(&mut block.min[axis]);
                 at_most_largest(max.add(rounding(max))).store(&mut block.max[axis]);
             }
@@ -120,12 +170,17 @@ impl Kernel for RefitTriangles<'_> {
 
 /// The corners a, b, c of eight slots, each as x, y, z.
 #[inline(always)]
-pub(super) fn corners<L: Lanes>(nodes: &[[f32; 4]], slots: &[[u32; 4]; WIDTH]) -> [[L; 3]; 3] {
+pub(super) fn corners<L: Lanes>(nodes: &[[f32; 4]], slots: &[[u32; 3]; WIDTH]) -> [[L; 3]; 3] {
     [gather(nodes, slots, 0), gather(nodes, slots, 1), gather(nodes, slots, 2)]
 }
 
+/// One corner of eight slots.
 #[inline(always)]
-fn gather<L: Lanes>(nodes: &[[f32; 4]], slots: &[[u32; 4]; WIDTH], corner: usize) -> [L; 3] {
+pub(super) fn gather<L: Lanes, const N: usize>(
+    nodes: &[[f32; 4]],
+    slots: &[[u32; N]; WIDTH],
+    corner: usize,
+) -> [L; 3] {
     let [a, b, c, d, e, f, g, h] = slots;
     L::gather([
         &nodes[a[corner] as usize],

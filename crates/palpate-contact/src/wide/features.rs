@@ -3,7 +3,7 @@
 //! The closest points are found approximately and give the axis; the proof is the projection on it
 //! (`Reach::separated`), so that nothing depends on how good the approximation is.
 
-use super::boxes::corners;
+use super::boxes::{corners, gather};
 use super::separation::{Reach, cross, dot, sub};
 use super::{WIDTH, WideBody};
 use crate::simd::{Kernel, Lanes};
@@ -27,7 +27,7 @@ impl Kernel for VertexPairs<'_> {
         for batch in candidates.chunks(WIDTH) {
             let lane = |i: usize| batch.get(i).unwrap_or(&batch[0]);
             let nodes = std::array::from_fn(|i| &from.nodes[lane(i)[0] as usize]);
-            let slots = std::array::from_fn(|i| to.triangles.slots[lane(i)[1] as usize]);
+            let slots = std::array::from_fn(|i| to.triangles.corners[lane(i)[1] as usize]);
             let point = L::gather(nodes);
             let [a, b, c] = corners::<L>(&to.nodes, &slots);
             let triangle = [sub(a, point), sub(b, point), sub(c, point)];
@@ -56,25 +56,19 @@ impl Kernel for EdgePairs<'_> {
         let Self { a, b, reach, candidates, kept } = self;
         for batch in candidates.chunks(WIDTH) {
             let lane = |i: usize| batch.get(i).unwrap_or(&batch[0]);
-            let edges_a = std::array::from_fn(|i| lane(i)[0]);
-            let edges_b = std::array::from_fn(|i| lane(i)[1]);
-            let start = L::gather(ends(a, edges_a, 0));
-            let along_a = sub(L::gather(ends(a, edges_a, 1)), start);
-            let ends_b = [
-                sub(L::gather(ends(b, edges_b, 0)), start),
-                sub(L::gather(ends(b, edges_b, 1)), start),
+            let edges_a = std::array::from_fn(|i| a.edges.corners[lane(i)[0] as usize]);
+            let edges_b = std::array::from_fn(|i| b.edges.corners[lane(i)[1] as usize]);
+            let start = gather(&a.nodes, &edges_a, 0);
+            let along_a = sub(gather(&a.nodes, &edges_a, 1), start);
+            let ends_b: [[L; 3]; 2] = [
+                sub(gather(&b.nodes, &edges_b, 0), start),
+                sub(gather(&b.nodes, &edges_b, 1), start),
             ];
             let axis = between_edges(along_a, ends_b);
             let apart = reach.separated(axis, [[L::splat(0.0); 3], along_a], ends_b);
             keep(batch, apart, kept);
         }
     }
-}
-
-/// Start (0) or end (1) of each edge.
-#[inline(always)]
-fn ends(body: &WideBody, slots: [u32; WIDTH], which: usize) -> [&[f32; 4]; WIDTH] {
-    slots.map(|slot| &body.nodes[body.edges.slots[slot as usize][which] as usize])
 }
 
 #[inline(always)]

@@ -1,92 +1,65 @@
-//! Elements in blocks, and the boxes above them.
+//! Elements in blocks.
 
 use palpate_geometry::Point;
-use palpate_model::mesh::NONE;
 
 use super::WIDTH;
-use super::boxes::{self, Block};
+use super::boxes::Levels;
 use super::order::block_order;
 use crate::simd::Isa;
 
-/// Elements of one kind (triangles, edges or nodes) with an implicit eight-ary hierarchy of boxes.
+/// Elements of N nodes (triangles, edges or nodes) with an implicit eight-ary hierarchy of boxes.
 #[derive(Debug)]
-pub(crate) struct Hierarchy {
-    /// Per slot: three indices into the body's nodes, the last repeated where the element has fewer,
-    /// and the element ([`NONE`] in a pad).
-    pub(super) slots: Vec<[u32; 4]>,
-    /// `levels[0]`: boxes of the elements; `levels[k]`: boxes of the blocks of level k - 1. The last
-    /// has one block.
-    levels: Vec<Vec<Block>>,
-    /// A level above the last: everything in lane 0.
-    above: Block,
+pub(crate) struct Hierarchy<const N: usize> {
+    /// Per slot: indices into the body's nodes. The last block is filled up with pads.
+    pub(super) corners: Vec<[u32; N]>,
+    /// Per slot but the pads: the element; empty where elements are their slots.
+    elements: Vec<u32>,
+    /// Number of slots without the pads.
+    pub(super) count: usize,
+    pub(crate) boxes: Levels,
 }
 
-impl Hierarchy {
+impl<const N: usize> Hierarchy<N> {
     /// Elements by their nodes, ordered by `positions` of the nodes.
-    pub(super) fn new(elements: &[[u32; 3]], positions: &[Point]) -> Self {
-        let third = |node: u32| positions[node as usize].map(|value| value / 3.0);
+    pub(super) fn new(elements: &[[u32; N]], positions: &[Point]) -> Self {
+        let share = |node: u32| positions[node as usize].map(|value| value / N as f64);
         let centers: Vec<Point> = elements
             .iter()
             .map(|corners| {
-                let [a, b, c] = corners.map(third);
-                std::array::from_fn(|axis| a[axis] + b[axis] + c[axis])
+                let shares = corners.map(share);
+                std::array::from_fn(|axis| shares.iter().map(|share| share[axis]).sum())
             })
             .collect();
-        Self::from_order(elements, block_order(&centers).into_iter())
+        let order = block_order(&centers);
+        let corners = order.iter().map(|&element| elements[element as usize]).collect();
+        Self { elements: order, ..Self::in_order(corners) }
     }
 
     /// Elements by their nodes, which stand in a good order.
-    pub(super) fn in_order(elements: &[[u32; 3]]) -> Self {
-        Self::from_order(elements, 0..elements.len() as u32)
+    pub(super) fn in_order(mut corners: Vec<[u32; N]>) -> Self {
+        let count = corners.len();
+        corners.resize(count.next_multiple_of(WIDTH), [0; N]);
+        let boxes = Levels::empty(corners.len() / WIDTH);
+        Self { corners, elements: Vec::new(), count, boxes }
     }
 
-    fn from_order(elements: &[[u32; 3]], order: impl Iterator<Item = u32>) -> Self {
-        let slot = |element: u32| {
-            let [a, b, c] = elements[element as usize];
-            [a, b, c, element]
-        };
-        let mut slots: Vec<[u32; 4]> = order.map(slot).collect();
-        slots.resize(slots.len().next_multiple_of(WIDTH), [0, 0, 0, NONE]);
-        let levels = boxes::empty_levels(slots.len() / WIDTH);
-        Self { slots, levels, above: Block::EMPTY }
-    }
-
-    /// The element in a slot.
+    /// The element in a slot, which is not a pad.
     pub(crate) fn element(&self, slot: u32) -> u32 {
-        self.slots[slot as usize][3]
+        self.elements.get(slot as usize).copied().unwrap_or(slot)
     }
 
-    /// Number of levels; zero without elements.
-    pub(crate) fn depth(&self) -> usize {
-        self.levels.len()
+    /// Which lanes of a block hold elements.
+    pub(super) fn lanes(&self, block: usize) -> u8 {
+        let count = self.count - block * WIDTH;
+        if count >= WIDTH { u8::MAX } else { (1 << count) - 1 }
     }
 
-    /// Blocks of level `k`, of any k.
-    pub(super) fn level(&self, k: usize) -> &[Block] {
-        self.levels.get(k).map_or(std::slice::from_ref(&self.above), Vec::as_slice)
-    }
-
-    /// Number of blocks of all levels.
-    pub(crate) fn block_count(&self) -> u64 {
-        self.levels.iter().map(|level| level.len() as u64).sum()
-    }
-
-    /// Lower and upper corner of a box around everything; `None` where that exceeds `f32`, or nothing is
-    /// there.
-    pub(crate) fn bounds(&self) -> Option<[[f32; 3]; 2]> {
-        let bounds = [self.above.min, self.above.max].map(|side| side.map(|axis| axis[0]));
-        bounds.as_flattened().iter().all(|value| value.abs() < f32::MAX).then_some(bounds)
-    }
-
-    /// At least the largest coordinate; infinite where `f32` ends.
-    pub(super) fn largest_coordinate(&self) -> f32 {
-        let largest = |bounds: [[f32; 3]; 2]| {
-            bounds.as_flattened().iter().fold(0.0, |largest: f32, value| largest.max(value.abs()))
-        };
-        self.bounds().map_or(f32::INFINITY, largest)
+    /// Bytes of the slots.
+    pub(super) fn slot_bytes(&self) -> usize {
+        size_of_val(self.corners.as_slice()) + size_of_val(self.elements.as_slice())
     }
 
     pub(super) fn refit(&mut self, isa: Isa, nodes: &[[f32; 4]]) {
-        boxes::refit(isa, nodes, &self.slots, &mut self.levels, &mut self.above);
+        self.boxes.refit(isa, nodes, &self.corners, self.count);
     }
 }

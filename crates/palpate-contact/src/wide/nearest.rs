@@ -1,7 +1,6 @@
 //! The triangles of a body from near to far, through the blocks.
 
 use palpate_geometry::Point;
-use palpate_model::mesh::NONE;
 
 use super::boxes::Block;
 use super::{WIDTH, WideBody};
@@ -42,16 +41,16 @@ impl WideSurface<'_> {
         mut visit: impl FnMut(u32) -> f64,
     ) {
         let triangles = &self.body.triangles;
-        let Some(measure) = measure.of_blocks(self.origin, triangles.largest_coordinate()) else {
-            let all = triangles.slots.iter().filter(|slot| slot[3] != NONE);
-            all.for_each(|slot| {
-                visit(slot[3]);
-            });
+        let Some(measure) = measure.of_blocks(self.origin, triangles.boxes.largest_coordinate())
+        else {
+            for slot in 0..triangles.count as u32 {
+                visit(triangles.element(slot));
+            }
             return;
         };
         let mut waiting = [Waiting { key: 0.0, level: 0, block: 0 }; WAITING];
         let mut count = 0_usize;
-        if let Some(top) = triangles.depth().checked_sub(1) {
+        if let Some(top) = triangles.boxes.depth().checked_sub(1) {
             waiting[0].level = top as u32;
             count = 1;
         }
@@ -61,7 +60,7 @@ impl WideSurface<'_> {
             if f64::from(key) > limit {
                 continue;
             }
-            let boxes = &triangles.level(level as usize)[block as usize];
+            let boxes = &triangles.boxes.level(level as usize)[block as usize];
             let keys = self.isa.run(Measured { measure, boxes });
             let (lanes, found) = near_last(&keys, limit);
             for &lane in &lanes[..found] {

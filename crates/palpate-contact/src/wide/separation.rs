@@ -21,7 +21,8 @@ pub(crate) struct Reach {
 impl Reach {
     /// Elements of two bodies further apart than `margin` are not wanted.
     pub(crate) fn new(a: &WideBody, b: &WideBody, margin: f64) -> Self {
-        let largest = a.triangles.largest_coordinate().max(b.triangles.largest_coordinate());
+        let largest = [a, b].map(|body| body.triangles.boxes.largest_coordinate());
+        let largest = largest[0].max(largest[1]);
         let margin = if margin > 0.0 { round_up(margin) } else { 0.0 };
         Self { margin, scale: 8.0 * largest }
     }
@@ -109,7 +110,7 @@ impl Kernel for SeparateTriangles<'_> {
             // Lanes beyond the last candidate repeat the first.
             let lane = |i: usize| batch.get(i).unwrap_or(&batch[0]);
             let slots = |side: usize, body: &WideBody| {
-                std::array::from_fn(|i| body.triangles.slots[lane(i)[side] as usize])
+                std::array::from_fn(|i| body.triangles.corners[lane(i)[side] as usize])
             };
             let [a0, a1, a2] = corners::<L>(&a.nodes, &slots(0, a));
             let of_b = corners::<L>(&b.nodes, &slots(1, b));

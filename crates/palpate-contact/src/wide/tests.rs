@@ -3,12 +3,11 @@
 use std::sync::Arc;
 
 use palpate_geometry::Point;
-use palpate_model::mesh::NONE;
 use palpate_model::{Mesh, MeshData};
 
 use super::adjacency::{Adjacency, bits};
 use super::boxes::Block;
-use super::traverse::{Overlap, padding};
+use super::traverse::{Overlap, Pairs, padding};
 use super::{EdgePairs, Hierarchy, Reach, SeparateTriangles, VertexPairs, WideBody};
 use crate::simd::Isa;
 
@@ -73,6 +72,10 @@ fn tangle(count: usize, random: &mut Random) -> Arc<Mesh> {
     Arc::new(Mesh::new(MeshData { nodes, triangles, ..MeshData::default() }).expect("a tangle"))
 }
 
+fn largest_coordinate(body: &WideBody) -> f32 {
+    body.triangles.boxes.largest_coordinate()
+}
+
 fn bits_of(blocks: &[Block]) -> Vec<u32> {
     blocks.iter().flat_map(|b| b.min.iter().chain(&b.max).flatten().map(|v| v.to_bits())).collect()
 }
@@ -99,12 +102,13 @@ fn boxes_hold_their_triangles_and_children_at_any_scale() {
         let origin = if round % 2 == 0 { [0.0; 3] } else { positions[0] };
         body.refit(Isa::detect(), &positions, origin);
         let mut seen = vec![0; mesh.triangles().len()];
-        for (slot, &[.., triangle]) in body.triangles.slots.iter().enumerate() {
-            let (block, lane) = (&body.triangles.level(0)[slot / 8], slot % 8);
-            if triangle == NONE {
+        for slot in 0..body.triangles.corners.len() {
+            let (block, lane) = (&body.triangles.boxes.level(0)[slot / 8], slot % 8);
+            if slot >= body.triangles.count {
                 assert!((0..3).all(|axis| block.min[axis][lane] > block.max[axis][lane]));
                 continue;
             }
+            let triangle = body.triangles.element(slot as u32);
             seen[triangle as usize] += 1;
             for node in mesh.triangles()[triangle as usize] {
                 for axis in 0..3 {
@@ -117,9 +121,9 @@ fn boxes_hold_their_triangles_and_children_at_any_scale() {
             }
         }
         assert!(seen.iter().all(|&count| count == 1));
-        for level in 0..body.triangles.depth() {
-            for (index, block) in body.triangles.level(level).iter().enumerate() {
-                let parent = &body.triangles.level(level + 1)[index / 8];
+        for level in 0..body.triangles.boxes.depth() {
+            for (index, block) in body.triangles.boxes.level(level).iter().enumerate() {
+                let parent = &body.triangles.boxes.level(level + 1)[index / 8];
                 for axis in 0..3 {
                     for lane in 0..8 {
                         assert!(parent.min[axis][index % 8] <= block.min[axis][lane]);
@@ -145,9 +149,21 @@ fn adjacency_is_what_the_corners_say() {
 
 /// Each pair of elements shares a node, or is left to the masks of neighbouring blocks, or to the
 /// traversal.
-fn check_adjacency(a: &Hierarchy, b: &Hierarchy, same: bool, adjacency: &Adjacency) {
+fn check_adjacency<const A: usize, const B: usize>(
+    a: &Hierarchy<A>,
+    b: &Hierarchy<B>,
+    same: bool,
+    adjacency: &Adjacency,
+) {
+    let pairs: Vec<[u32; 2]> = adjacency.pairs(0..adjacency.len()).collect();
+    assert!(pairs.is_sorted_by_key(|pair| pair[0]));
+    // From any start.
+    for start in 0..pairs.len() {
+        let end = pairs.len().min(start + 70);
+        assert!(adjacency.pairs(start..end).eq(pairs[start..end].iter().copied()));
+    }
     let mut apart = Vec::new();
-    for (&[i, j], &mask) in adjacency.pairs.iter().zip(&adjacency.apart) {
+    for (&[i, j], &mask) in pairs.iter().zip(&adjacency.apart) {
         assert!(!same || i <= j);
         assert_eq!(adjacency.child_pairs([i / 8, j / 8]) >> (8 * (i % 8) + j % 8) & 1, 1);
         apart.extend(bits(mask).map(|bit| [8 * i + bit as u32 / 8, 8 * j + bit as u32 % 8]));
@@ -160,22 +176,21 @@ fn check_adjacency(a: &Hierarchy, b: &Hierarchy, same: bool, adjacency: &Adjacen
     }
     sorted.sort_unstable();
     let child_pairs = |i: usize, j: usize| adjacency.child_pairs([i as u32, j as u32]).count_ones();
-    let (rows, columns) = (a.level(1).len(), b.level(1).len());
+    let (rows, columns) = (a.boxes.level(1).len(), b.boxes.level(1).len());
     let children: u32 = (0..rows)
         .flat_map(|i| (0..columns).map(move |j| (i, j)))
         .map(|(i, j)| child_pairs(i, j))
         .sum();
-    assert_eq!(children as usize, adjacency.pairs.len());
-    let is_adjacent = |i: u32, j: u32| adjacency.pairs.binary_search(&[i / 8, j / 8]).is_ok();
-    let elements =
-        |side: &Hierarchy| side.slots.iter().filter(|slot| slot[3] != NONE).count() as u32;
-    for i in 0..elements(a) {
-        for j in 0..elements(b) {
+    assert_eq!(children as usize, pairs.len());
+    let is_adjacent = |i: u32, j: u32| pairs.contains(&[i / 8, j / 8]);
+    let (count_a, count_b) = (a.count as u32, b.count as u32);
+    for i in 0..count_a {
+        for j in 0..count_b {
             if same && j <= i {
                 continue;
             }
-            let corners = [&a.slots[i as usize][..3], &b.slots[j as usize][..3]];
-            let share = corners[0].iter().any(|node| corners[1].contains(node));
+            let (corners_a, corners_b) = (a.corners[i as usize], b.corners[j as usize]);
+            let share = corners_a.iter().any(|node| corners_b.contains(node));
             let end = |pair: &[u32; 2]| *pair <= [i, j];
             let occurs =
                 sorted.partition_point(end) - sorted.partition_point(|pair| *pair < [i, j]);
@@ -183,7 +198,7 @@ fn check_adjacency(a: &Hierarchy, b: &Hierarchy, same: bool, adjacency: &Adjacen
             assert!(!share || is_adjacent(i, j));
         }
     }
-    assert!(apart.iter().all(|&[i, j]| i < elements(a) && j < elements(b)));
+    assert!(apart.iter().all(|&[i, j]| i < count_a && j < count_b));
 }
 
 #[test]
@@ -209,9 +224,9 @@ fn kernels_give_the_bits_of_plain_rust(fast: Isa) {
         let ([a, b], [slow_a, slow_b]) = (packed(fast), packed(Isa::Scalar));
         for (body, slow) in [(&a, &slow_a), (&b, &slow_b)] {
             for (fast, slow) in [
-                (&body.triangles, &slow.triangles),
-                (&body.edges, &slow.edges),
-                (&body.points, &slow.points),
+                (&body.triangles.boxes, &slow.triangles.boxes),
+                (&body.edges.boxes, &slow.edges.boxes),
+                (&body.points.boxes, &slow.points.boxes),
             ] {
                 for level in 0..=fast.depth() {
                     assert_eq!(bits_of(fast.level(level)), bits_of(slow.level(level)));
@@ -219,16 +234,23 @@ fn kernels_give_the_bits_of_plain_rust(fast: Isa) {
             }
         }
         for margin in [0.0, 1e-3, 0.2, 1e300] {
-            let blocks = |body: &WideBody| body.triangles.level(0).len() as u32;
+            let blocks = |body: &WideBody| body.triangles.boxes.level(0).len() as u32;
             let pairs: Vec<[u32; 2]> =
                 (0..blocks(&a)).flat_map(|i| (0..blocks(&b)).map(move |j| [i, j])).collect();
-            let largest = a.triangles.largest_coordinate().max(b.triangles.largest_coordinate());
+            let largest = largest_coordinate(&a).max(largest_coordinate(&b));
             let padding = padding(margin, largest);
             assert!(padding.is_none_or(|padding| f64::from(padding) > margin));
             let masks = |isa: Isa| {
                 let mut masks = Vec::new();
-                let (a, b) = (a.triangles.level(0), b.triangles.level(0));
-                isa.run(Overlap { a, b, pairs: &pairs, margin, padding, masks: &mut masks });
+                let (a, b) = (a.triangles.boxes.level(0), b.triangles.boxes.level(0));
+                isa.run(Overlap {
+                    a,
+                    b,
+                    pairs: Pairs::Listed(&pairs),
+                    margin,
+                    padding,
+                    masks: &mut masks,
+                });
                 masks
             };
             assert_eq!(masks(fast), masks(Isa::Scalar));

@@ -1,9 +1,9 @@
 //! Simultaneous traversal, level by level, on lists of block pairs.
 
-use super::adjacency::{Adjacency, UPPER, bits};
-use super::boxes::{Block, at_least_lowest, at_most_largest, rounding};
+use super::WIDTH;
+use super::adjacency::{Adjacency, Seconds, UPPER, bits};
+use super::boxes::{Block, Levels, at_least_lowest, at_most_largest, rounding};
 use super::separation::round_up;
-use super::{Hierarchy, WIDTH};
 use crate::leaf_pairs::Cost;
 use crate::simd::{Isa, Kernel, Lanes};
 
@@ -19,8 +19,8 @@ pub(crate) struct Traversal {
 /// What a traversal compares.
 #[derive(Clone, Copy)]
 pub(crate) struct Sides<'a> {
-    pub(crate) a: &'a Hierarchy,
-    pub(crate) b: &'a Hierarchy,
+    a: &'a Levels,
+    b: &'a Levels,
     /// Whether a and b are one and the same: each unordered pair is then met once.
     same: bool,
     /// For one body: what shares a node.
@@ -32,7 +32,7 @@ pub(crate) struct Sides<'a> {
 
 impl<'a> Sides<'a> {
     pub(super) fn new(
-        [a, b]: [&'a Hierarchy; 2],
+        [a, b]: [&'a Levels; 2],
         own: Option<&'a Adjacency>,
         same: bool,
         margin: f64,
@@ -41,12 +41,7 @@ impl<'a> Sides<'a> {
         Self { a, b, same, own, margin, padding: padding(margin, largest) }
     }
 
-    fn overlap<'b>(
-        &self,
-        level: usize,
-        pairs: &'b [[u32; 2]],
-        masks: &'b mut Vec<u64>,
-    ) -> Overlap<'b>
+    fn overlap<'b>(&self, level: usize, pairs: Pairs<'b>, masks: &'b mut Vec<u64>) -> Overlap<'b>
     where
         'a: 'b,
     {
@@ -64,11 +59,17 @@ impl<'a> Sides<'a> {
 
     /// Number of block pairs that share a node, which the traversal leaves out.
     pub(crate) fn adjacent_count(&self) -> usize {
-        self.own.map_or(0, |adjacency| adjacency.pairs.len())
+        self.own.map_or(0, Adjacency::len)
     }
 }
 
 impl Traversal {
+    /// Memory of the buffers in bytes.
+    pub(crate) fn bytes(&self) -> usize {
+        let Self { pairs, next, masks } = self;
+        bytes(pairs) + bytes(next) + bytes(masks)
+    }
+
     /// Goes down one level, from `level`, which is not 0.
     pub(crate) fn descend(&mut self, isa: Isa, sides: &Sides, level: usize, cost: &mut Cost) {
         self.test(isa, sides, level, cost);
@@ -123,12 +124,13 @@ impl Traversal {
         let Some(adjacency) = sides.own else {
             return;
         };
-        let pairs = &adjacency.pairs[range.clone()];
         self.masks.clear();
-        isa.run(sides.overlap(0, pairs, &mut self.masks));
-        cost.count(pairs.len());
-        cost.leaf_pairs += pairs.len() as u64;
-        for ((&pair, &mask), &apart) in pairs.iter().zip(&self.masks).zip(&adjacency.apart[range]) {
+        let seconds = adjacency.seconds(range.clone());
+        isa.run(sides.overlap(0, Pairs::Neighbours(seconds), &mut self.masks));
+        cost.count(range.len());
+        cost.leaf_pairs += range.len() as u64;
+        let apart = &adjacency.apart[range.clone()];
+        for ((pair, &mask), &apart) in adjacency.pairs(range).zip(&self.masks).zip(apart) {
             let once = || if sides.same && pair[0] == pair[1] { UPPER } else { u64::MAX };
             let wanted = if sharing { !apart & once() } else { apart };
             push_lanes(pair, mask & wanted, candidates);
@@ -137,9 +139,14 @@ impl Traversal {
 
     fn test(&mut self, isa: Isa, sides: &Sides, level: usize, cost: &mut Cost) {
         self.masks.clear();
-        isa.run(sides.overlap(level, &self.pairs, &mut self.masks));
+        isa.run(sides.overlap(level, Pairs::Listed(&self.pairs), &mut self.masks));
         cost.count(self.pairs.len());
     }
+}
+
+/// Memory of a buffer, whether it is in use or not.
+pub(crate) fn bytes<T>(buffer: &Vec<T>) -> usize {
+    buffer.capacity() * size_of::<T>()
 }
 
 impl Cost {
@@ -157,11 +164,18 @@ fn push_lanes([a, b]: [u32; 2], mask: u64, found: &mut Vec<[u32; 2]>) {
     }
 }
 
+/// Pairs of blocks.
+#[derive(Clone, Copy)]
+pub(super) enum Pairs<'a> {
+    Listed(&'a [[u32; 2]]),
+    Neighbours(Seconds<'a>),
+}
+
 /// Which boxes of two blocks meet: bit 8 i + j for lane i of a and lane j of b.
 pub(super) struct Overlap<'a> {
     pub(super) a: &'a [Block],
     pub(super) b: &'a [Block],
-    pub(super) pairs: &'a [[u32; 2]],
+    pub(super) pairs: Pairs<'a>,
     pub(super) margin: f64,
     /// By [`padding`] of the margin.
     pub(super) padding: Option<f32>,
@@ -174,25 +188,47 @@ impl Kernel for Overlap<'_> {
     #[inline(always)]
     fn run<L: Lanes>(self) {
         let Self { a, b, pairs, margin, padding, masks } = self;
+        let grow = match padding {
+            Some(padding) => Grow::Padded(L::splat(padding)),
+            None if margin > 0.0 => Grow::Widened(L::splat(round_up(margin))),
+            None => Grow::None,
+        };
         // Plain loops: what an iterator's adaptor does not inline is not compiled for the lanes.
-        masks.resize(pairs.len(), 0);
-        if let Some(padding) = padding {
-            let padding = L::splat(padding);
-            for (mask, &[i, j]) in masks.iter_mut().zip(pairs) {
-                // b, which a kernel holds in registers; a may be read number by number.
-                let b = padded(&b[j as usize], padding);
-                *mask = L::meet(a[i as usize].sides(), b.sides());
+        match pairs {
+            Pairs::Listed(pairs) => {
+                masks.resize(pairs.len(), 0);
+                for (mask, &[i, j]) in masks.iter_mut().zip(pairs) {
+                    *mask = grow.meet(&a[i as usize], &b[j as usize]);
+                }
             }
-        } else if margin > 0.0 {
-            let margin = L::splat(round_up(margin));
-            for (mask, &[i, j]) in masks.iter_mut().zip(pairs) {
-                let b = widened(&b[j as usize], margin);
-                *mask = L::meet(a[i as usize].sides(), b.sides());
+            Pairs::Neighbours(seconds) => {
+                masks.resize(seconds.len(), 0);
+                let mut rows = seconds.rows();
+                for (index, mask) in masks.iter_mut().enumerate() {
+                    let [i, j] = seconds.next(index, &mut rows);
+                    *mask = grow.meet(&a[i as usize], &b[j as usize]);
+                }
             }
-        } else {
-            for (mask, &[i, j]) in masks.iter_mut().zip(pairs) {
-                *mask = L::meet(a[i as usize].sides(), b[j as usize].sides());
-            }
+        }
+    }
+}
+
+/// How boxes are made larger by a margin.
+#[derive(Clone, Copy)]
+enum Grow<L> {
+    None,
+    Padded(L),
+    Widened(L),
+}
+
+impl<L: Lanes> Grow<L> {
+    /// b grows, which a kernel holds in registers; a may be read number by number.
+    #[inline(always)]
+    fn meet(self, a: &Block, b: &Block) -> u64 {
+        match self {
+            Self::None => L::meet(a.sides(), b.sides()),
+            Self::Padded(padding) => L::meet(a.sides(), padded(b, padding).sides()),
+            Self::Widened(margin) => L::meet(a.sides(), widened(b, margin).sides()),
         }
     }
 }
