@@ -190,3 +190,15 @@ def test_real_organs_touch_where_they_are_known_to(organs):
     for pair in found.bodies.tolist():
         counts[tuple(pair)] = counts.get(tuple(pair), 0) + 1
     assert counts == {(0, 3): 37, (2, 3): 14}
+
+
+def test_memory_is_told_by_part(make_box):
+    mesh = make_box((12, 12, 12))
+    scene = palpate.Scene([mesh])
+    memory = scene.memory()
+    parts = ["nodes", "elements", "triangle_boxes", "feature_boxes"]
+    parts += ["triangle_masks", "feature_masks"]
+    assert sum(memory[part] for part in parts) == memory["layout"]
+    assert memory["layout_per_triangle"] == memory["layout"] / len(mesh.triangles)
+    assert memory["layout_per_triangle"] <= 160
+    assert palpate.Scene([mesh], method="paper").memory()["layout"] == 0

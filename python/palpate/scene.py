@@ -306,6 +306,13 @@ class Scene:
         distance = float(max_distance)
         return (*arrays, index, distance)
 
+    def memory(self) -> dict[str, float]:
+        """Bytes that the method keeps beside the meshes, by part; zero for methods without a layout.
+
+        ``layout`` is the sum of all parts but ``buffers``, which grow with what is found.
+        """
+        return self._core.memory()
+
     def tree_stats(self, body: int | str) -> dict[str, Any]:
         """Counts of a body's bounding tree: nodes, leaves, depth, how full the leaves are."""
         return self._core.tree_stats(body_index(self._names, body))

@@ -194,6 +194,21 @@ impl PyScene {
         surface_point_arrays(py, found)
     }
 
+    fn memory<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let memory = self.lock().0.memory();
+        let row = PyDict::new(py);
+        row.set_item("nodes", memory.nodes)?;
+        row.set_item("elements", memory.elements)?;
+        row.set_item("triangle_boxes", memory.triangle_boxes)?;
+        row.set_item("feature_boxes", memory.feature_boxes)?;
+        row.set_item("triangle_masks", memory.triangle_masks)?;
+        row.set_item("feature_masks", memory.feature_masks)?;
+        row.set_item("layout", memory.layout())?;
+        row.set_item("layout_per_triangle", memory.layout_per_triangle())?;
+        row.set_item("buffers", memory.buffers)?;
+        Ok(row)
+    }
+
     fn tree_stats<'py>(&self, py: Python<'py>, body: usize) -> PyResult<Bound<'py, PyDict>> {
         let guard = self.lock();
         let tree = guard.0.tree(body);

@@ -78,7 +78,7 @@ fn longest_axis(range: &[Placed]) -> usize {
         }
     }
     let length = |axis: usize| max[axis] - min[axis];
-    let longest = if length(1) > length(0) { 1 } else { 0 };
+    let longest = usize::from(length(1) > length(0));
     if length(2) > length(longest) { 2 } else { longest }
 }
 
