@@ -45,7 +45,7 @@ impl Among<'_> {
     /// The point closest to `point` that is at most `within` \[m\] away.
     pub(crate) fn closest(&self, point: Point, within: f64) -> Option<SurfacePoint> {
         let mut search = ClosestSearch::new(point, within, &self.upper.bounds());
-        self.visit(&mut search, ClosestSearch::reaches, |search, body| {
+        self.visit(&mut search, &ClosestSearch::key, &ClosestSearch::limit, &mut |search, body| {
             search.body(&self.surfaces, body, |_, _, _| true);
         });
         let Closest { body, triangle, weights, distance_squared } = search.best?;
@@ -56,7 +56,7 @@ impl Among<'_> {
     /// The first hit of a ray that is at most `within` \[m\] away.
     pub(crate) fn cast(&self, ray: Ray, within: f64) -> Option<SurfacePoint> {
         let mut search = RaySearch::new(ray, within, &self.upper.bounds());
-        self.visit(&mut search, RaySearch::reaches, |search, body| {
+        self.visit(&mut search, &RaySearch::key, &RaySearch::limit, &mut |search, body| {
             search.body(&self.surfaces, body, |_| true);
         });
         let hit = search.best.filter(|hit| hit.distance <= within)?;
@@ -67,8 +67,10 @@ impl Among<'_> {
     pub(crate) fn contains(&self, point: Point, inside: &mut [bool]) {
         inside.fill(false);
         let mut inside = inside;
-        let around = |_: &&mut [bool], bounds: &Aabb| bounds.contains(&point);
-        self.visit(&mut inside, around, |inside, body| {
+        let around = |_: &&mut [bool], bounds: &Aabb| {
+            if bounds.contains(&point) { 0.0 } else { f64::INFINITY }
+        };
+        self.visit(&mut inside, &around, &|_| 0.0, &mut |inside, body| {
             let column = if self.body.is_some() { 0 } else { body as usize };
             inside[column] = self.surfaces.is_inside(body, &point);
         });
@@ -77,12 +79,13 @@ impl Among<'_> {
     fn visit<S>(
         &self,
         state: &mut S,
-        reaches: impl Fn(&S, &Aabb) -> bool,
-        mut visit: impl FnMut(&mut S, u32),
+        key: &impl Fn(&S, &Aabb) -> f64,
+        limit: &impl Fn(&S) -> f64,
+        visit: &mut impl FnMut(&mut S, u32),
     ) {
         match self.body {
             Some(body) => visit(state, body),
-            None => self.upper.visit(state, reaches, visit),
+            None => self.upper.visit(state, key, limit, visit),
         }
     }
 

@@ -147,23 +147,42 @@ impl UpperTree {
         visited
     }
 
-    /// Calls `visit` with each body for which `reaches` holds, of its box and of all above it.
+    /// Calls `visit` with each body for which `key` of its box, and of all above it, is finite and at
+    /// most that of `limit`, which `visit` may lower; of two parts, the one with the smaller key first.
     pub(crate) fn visit<S>(
         &self,
         state: &mut S,
-        reaches: impl Fn(&S, &Aabb) -> bool,
-        mut visit: impl FnMut(&mut S, u32),
+        key: &impl Fn(&S, &Aabb) -> f64,
+        limit: &impl Fn(&S) -> f64,
+        visit: &mut impl FnMut(&mut S, u32),
     ) {
-        let mut index = 0;
-        while let Some(node) = self.nodes.get(index as usize) {
-            if !reaches(state, &node.bounds) {
-                index = node.skip;
-                continue;
+        if !self.nodes.is_empty() {
+            self.visit_from(0, state, key, limit, visit);
+        }
+    }
+
+    fn visit_from<S>(
+        &self,
+        index: u32,
+        state: &mut S,
+        key: &impl Fn(&S, &Aabb) -> f64,
+        limit: &impl Fn(&S) -> f64,
+        visit: &mut impl FnMut(&mut S, u32),
+    ) {
+        let node = &self.nodes[index as usize];
+        if let Some(body) = node.body {
+            return visit(state, body);
+        }
+        let (left, right) = (index + 1, self.nodes[index as usize + 1].skip);
+        let of = |state: &S, child: u32| key(state, &self.nodes[child as usize].bounds);
+        let mut parts = [(of(state, left), left), (of(state, right), right)];
+        if parts[1].0 < parts[0].0 {
+            parts.swap(0, 1);
+        }
+        for (key_of_part, part) in parts {
+            if key_of_part < f64::INFINITY && key_of_part <= limit(state) {
+                self.visit_from(part, state, key, limit, visit);
             }
-            if let Some(body) = node.body {
-                visit(state, body);
-            }
-            index += 1;
         }
     }
 

@@ -2,7 +2,7 @@
 
 use palpate_geometry::{Aabb, Point, PointTriangle, point_triangle};
 
-use crate::nearest::{Distance, Surfaces, rounding_at};
+use crate::nearest::{Distance, Measure, Surfaces, rounding_at};
 
 /// The surface point found closest, before it is dressed for the user.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,19 +29,23 @@ impl ClosestSearch {
     pub(crate) fn new(point: Point, within: f64, bounds: &Aabb) -> Self {
         let rounding = rounding_at(bounds, &point);
         let mut search = Self { point, rounding, limit_squared: f64::INFINITY, best: None };
-        search.limit_squared = search.limit(within);
+        search.limit_squared = search.beyond(within);
         search
     }
 
     /// A hair beyond `distance`, so that rounding never culls an equal.
-    fn limit(&self, distance: f64) -> f64 {
+    fn beyond(&self, distance: f64) -> f64 {
         let limit = distance * (1.0 + 1e-9) + self.rounding;
         limit * limit
     }
 
-    /// Whether a box may hold a point that is closer, or as close.
-    pub(crate) fn reaches(&self, bounds: &Aabb) -> bool {
-        !bounds.is_empty() && bounds.distance_squared(&self.point) <= self.limit_squared
+    /// Squared distance \[m²\] of a box; infinite for an empty one.
+    pub(crate) fn key(&self, bounds: &Aabb) -> f64 {
+        Distance(self.point).of_box(bounds)
+    }
+
+    pub(crate) fn limit(&self) -> f64 {
+        self.limit_squared
     }
 
     /// Searches the triangles of a body for which `keep` holds. Of equals, the smallest
@@ -63,7 +67,7 @@ impl ClosestSearch {
             if better && keep(triangle, &corners, &found) {
                 let PointTriangle { distance_squared, weights, .. } = found;
                 self.best = Some(Closest { body, triangle, weights, distance_squared });
-                self.limit_squared = self.limit_squared.min(self.limit(distance_squared.sqrt()));
+                self.limit_squared = self.limit_squared.min(self.beyond(distance_squared.sqrt()));
             }
             self.limit_squared
         });

@@ -145,10 +145,13 @@ impl RaySearch {
         Self { ray, entry, rounding, limit: within * (1.0 + 1e-9) + rounding, best: None }
     }
 
-    /// Whether a box may hold a nearer hit, or one as near.
-    pub(crate) fn reaches(&self, bounds: &Aabb) -> bool {
-        let key = self.entry.of_box(bounds);
-        key < f64::INFINITY && key <= self.limit
+    /// Distance \[m\] to a box; infinite where the ray misses it.
+    pub(crate) fn key(&self, bounds: &Aabb) -> f64 {
+        self.entry.of_box(bounds)
+    }
+
+    pub(crate) fn limit(&self) -> f64 {
+        self.limit
     }
 
     /// Searches the triangles of a body for which `keep` holds. Of equals, the smallest

@@ -433,6 +433,21 @@ fn depths(blocks: &[Arc<Mesh>; 2]) -> Vec<PenetratingNode> {
 }
 
 #[test]
+fn ignored_pairs_are_left_out_and_groups_are_not() {
+    let blocks = [block([2, 2, 2], |p| p), block([2, 2, 2], |p| p.map(|value| value + 0.8))];
+    let mut scene = scene(&blocks, SceneOptions::default());
+    let expected = scene.penetration(&|_, _| true).nodes.clone();
+    assert!(!expected.is_empty());
+    for body in [0, 1] {
+        let groups = vec![1; scene.mesh(body).triangles().len()];
+        scene.set_groups(body, &groups).expect("one for each triangle");
+    }
+    assert_eq!(scene.penetration(&|_, _| true).nodes, expected);
+    scene.ignore(1, 0, true).expect("two bodies");
+    assert_eq!(scene.penetration(&|_, _| true).nodes, []);
+}
+
+#[test]
 fn a_box_leaves_the_way_it_came() {
     // Into the top of a box, 0.3 m and 3.7 m deep of 4 m, near its side: only the top is crossed.
     for depth in [0.3, 1.2, 3.7] {
@@ -489,5 +504,18 @@ proptest! {
         let case = deforming(meshes, 2, &mut random)
             .and(|p| p.map(|value| (value * grid).round() / grid));
         check(&case, &[true; 2]);
+    }
+
+    #[test]
+    fn random_rolls(
+        seed: u64,
+        width in 1_usize..4,
+        height in 1_usize..3,
+        turns in 1.02_f64..1.5,
+        pitch in 0.1_f64..2.5,
+    ) {
+        let mut random = Random(seed);
+        let case = roll([width, height, 30], 4.5, turns, pitch, &mut random);
+        check(&case, &[true]);
     }
 }
