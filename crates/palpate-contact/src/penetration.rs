@@ -71,8 +71,15 @@ impl PenetrationSearch {
         crossing.pairs.clear();
         crossing.stats = DetectionStats::default();
         if !pairs.is_empty() {
-            let options = IntersectionOptions { self_contact, same_leaf: true, shared_nodes: true };
+            let mut options =
+                IntersectionOptions { self_contact, same_leaf: true, shared_nodes: false };
             detector.intersections(frame, options, crossing);
+            // Triangles that share nodes cost much more, and only go on where others cross.
+            if crossing.pairs.iter().any(|pair| pair.body_a == pair.body_b) {
+                crossing.pairs.clear();
+                options.shared_nodes = true;
+                detector.intersections(frame, options, crossing);
+            }
         }
         found.stats = crossing.stats;
         found.stats.nodes_visited += visited;
