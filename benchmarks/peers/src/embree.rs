@@ -42,13 +42,6 @@ struct Collision {
     primitive_b: c_uint,
 }
 
-/// What an update does to the trees.
-#[derive(Clone, Copy)]
-pub enum Update {
-    Refit,
-    Rebuild,
-}
-
 pub struct Embree {
     functions: Functions,
     scene: Handle,
@@ -66,7 +59,7 @@ struct Functions {
 }
 
 impl Embree {
-    pub fn new(scene: &Scene, path: &str, update: Update) -> Result<Self, Box<dyn Error>> {
+    pub fn new(scene: &Scene, path: &str) -> Result<Self, Box<dyn Error>> {
         // SAFETY: Embree's initialisers have no requirements, and the types of its functions are those
         // of its header; handles are used while the library, kept in `Functions`, is loaded.
         unsafe {
@@ -111,11 +104,7 @@ impl Embree {
                 set_count(geometry, boxes.len() as c_uint);
                 set_user(geometry, boxes.as_mut_ptr().cast());
                 set_bounds(geometry, bounds_of, std::ptr::null_mut());
-                let quality = match update {
-                    Update::Refit => BUILD_QUALITY_REFIT,
-                    Update::Rebuild => BUILD_QUALITY_MEDIUM,
-                };
-                set_quality(geometry, quality);
+                set_quality(geometry, BUILD_QUALITY_REFIT);
                 (functions.commit_geometry)(geometry);
                 if attach(handle, geometry) as usize != body {
                     return Err("Embree numbers geometries otherwise than bodies".into());

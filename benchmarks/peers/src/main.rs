@@ -130,11 +130,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let scene = Scene::read(path)?;
     let mut trees = vec![("parry", Trees::Parry(parry::Parry::new(&scene)))];
     if let Some(library) = rest.first() {
-        for (name, update) in
-            [("embree-refit", embree::Update::Refit), ("embree-rebuild", embree::Update::Rebuild)]
-        {
-            trees.push((name, Trees::Embree(embree::Embree::new(&scene, library, update)?)));
-        }
+        trees.push(("embree", Trees::Embree(embree::Embree::new(&scene, library)?)));
     }
     let mut session = Session {
         distance: distance.parse()?,

@@ -80,12 +80,14 @@ impl Features {
     ) {
         let [a, b] = [&pair[..2], &pair[2..]].map(|side| self.side(scene, frame, side));
         for (nodes_of, triangle_of) in [(&a, &b), (&b, &a)] {
+            if nodes_of.owned & 7 == 0 {
+                continue;
+            }
             let [lower, upper] = bounds(&triangle_of.corners);
             for i in (0..3).filter(|i| nodes_of.owned >> i & 1 == 1) {
                 let (node, point) = (nodes_of.nodes[i], nodes_of.corners[i]);
-                let apart = apart(point, point, lower, upper, distance);
-                if !apart
-                    && !triangle_of.nodes.contains(&node)
+                if !triangle_of.nodes.contains(&node)
+                    && !apart(point, point, lower, upper, distance)
                     && point_triangle(point, &triangle_of.corners).distance_squared.sqrt()
                         < distance
                 {
@@ -95,17 +97,20 @@ impl Features {
                 }
             }
         }
-        for i in (0..3).filter(|i| a.owned >> (i + 3) & 1 == 1) {
-            let (edge_a, points_a) = a.edge(i);
-            let [lower_a, upper_a] = bounds(&points_a);
-            for j in (0..3).filter(|j| b.owned >> (j + 3) & 1 == 1) {
-                let (edge_b, points_b) = b.edge(j);
-                let [lower_b, upper_b] = bounds(&points_b);
-                if !apart(lower_a, upper_a, lower_b, upper_b, distance)
-                    && !edge_a.iter().any(|node| edge_b.contains(node))
-                    && edge_edge(&points_a, &points_b).distance_squared.sqrt() < distance
+        if a.owned >> 3 == 0 || b.owned >> 3 == 0 {
+            return;
+        }
+        let edges_b = b.edges();
+        for edge_a in a.edges().iter().flatten() {
+            let [lower_a, upper_a] = edge_a.bounds;
+            for edge_b in edges_b.iter().flatten() {
+                let [lower_b, upper_b] = edge_b.bounds;
+                if !edge_a.nodes.iter().any(|node| edge_b.nodes.contains(node))
+                    && !apart(lower_a, upper_a, lower_b, upper_b, distance)
+                    && edge_edge(&edge_a.points, &edge_b.points).distance_squared.sqrt() < distance
                 {
-                    let [first, second] = [edge_a.min(edge_b), edge_a.max(edge_b)];
+                    let [first, second] =
+                        [edge_a.nodes.min(edge_b.nodes), edge_a.nodes.max(edge_b.nodes)];
                     found.push([1, first[0], first[1], second[0], second[1]]);
                 }
             }
@@ -129,12 +134,25 @@ struct Side {
     owned: u8,
 }
 
+struct Edge {
+    nodes: [u32; 2],
+    points: [Point; 2],
+    bounds: [Point; 2],
+}
+
 impl Side {
-    /// Side `i`, its lower node first.
-    fn edge(&self, i: usize) -> ([u32; 2], [Point; 2]) {
-        let j = (i + 1) % 3;
-        let [first, second] = if self.nodes[i] < self.nodes[j] { [i, j] } else { [j, i] };
-        ([self.nodes[first], self.nodes[second]], [self.corners[first], self.corners[second]])
+    /// The sides that this triangle answers for, each from its lower node.
+    fn edges(&self) -> [Option<Edge>; 3] {
+        std::array::from_fn(|i| {
+            let j = (i + 1) % 3;
+            let [first, second] = if self.nodes[i] < self.nodes[j] { [i, j] } else { [j, i] };
+            let points = [self.corners[first], self.corners[second]];
+            (self.owned >> (i + 3) & 1 == 1).then(|| Edge {
+                nodes: [self.nodes[first], self.nodes[second]],
+                points,
+                bounds: bounds(&points),
+            })
+        })
     }
 }
 

@@ -180,14 +180,13 @@ def _draw(outcomes: Sequence[Outcome], path: Path) -> None:
             plots.COLORS[1] if each.contender.startswith("palpate") else plots.COLORS[0]
             for each in shown
         ]
-        one.barh(
-            range(len(shown)),
-            median,
-            xerr=[median - low, high - median],
-            color=color,
-            height=0.62,
-            error_kw={"elinewidth": 1, "ecolor": plots.INK},
-        )
+        # Dots, not bars: a logarithmic axis has no zero for a bar to stand on.
+        one.hlines(range(len(shown)), median.min() / 3, median, color=color, lw=1.2, alpha=0.35)
+        for index, each in enumerate(color):
+            error = [[median[index] - low[index]], [high[index] - median[index]]]
+            one.errorbar(
+                median[index], index, xerr=error, fmt="o", ms=6, color=each, ecolor=plots.INK
+            )
         marks = {Answer.CANDIDATES.value: " *", Answer.INTER_PAIRS.value: " †"}
         names = [each.contender + marks.get(each.finds, "") for each in shown]
         one.set_yticks(range(len(shown)), names, fontsize=7.5)
@@ -195,7 +194,7 @@ def _draw(outcomes: Sequence[Outcome], path: Path) -> None:
             one.annotate(
                 milliseconds(value / 1e3),
                 (high[index], index),
-                xytext=(4, 0),
+                xytext=(6, 0),
                 textcoords="offset points",
                 va="center",
                 fontsize=7,
@@ -203,7 +202,7 @@ def _draw(outcomes: Sequence[Outcome], path: Path) -> None:
             )
         plots.label(one, f"{group[0]}: {group[1]}", "ms per frame", "")
         plots.logarithmic(one, "x")
-        one.set_xlim(right=float(high.max()) * 3)
+        one.set_xlim(float(median.min()) / 3, float(high.max()) * 3)
         one.grid(visible=False, axis="y")
     plots.save(made, path)
 

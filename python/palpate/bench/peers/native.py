@@ -38,12 +38,12 @@ def embree(setting: Setting) -> list[Contender]:
     """Embree's rtcCollide, with the library that comes with embreex."""
     process = _Process(setting, _embree_library())
     name = f"Embree 4 (of embreex {metadata.version('embreex')})"
-    exact = "rtcCollide over user geometries; palpate's exact test on its candidates"
-    near = "rtcCollide over user geometries; palpate's distances on its candidates"
+    trees = "rtcCollide over user geometries, build quality refit"
+    exact = f"{trees}; palpate's exact test on its candidates"
+    near = f"{trees}; palpate's distances on its candidates"
     return [
-        process.contender(f"{query} embree-{update}", f"{name}, {update}", how)
-        for query, how in (("intersections", exact), ("proximity", near))
-        for update in ("refit", "rebuild")
+        process.contender("intersections embree", name, exact),
+        process.contender("proximity embree", name, near),
     ]
 
 
