@@ -114,7 +114,7 @@ def test_scaling_measures_every_size_and_names_what_it_leaves_out(tmp_path):
     tray = 2700
     assert second[0]["triangles"] - tray == 4 * (first[0]["triangles"] - tray)
     assert all(increasing(each["times"]["wall"]) for each in results["measurements"])
-    for query in ("intersections", "proximity"):
+    for query in (scaling.INTERSECTIONS, scaling.PROXIMITY, scaling.PROXIMITY_BY_EDGE):
         pairs = {
             each["pairs"]
             for each in second

@@ -52,6 +52,8 @@ def markdown_table(headings: str, rows: Iterable[Sequence[Any]]) -> str:
 def milliseconds(seconds: float) -> str:
     """A time in milliseconds with three digits that mean something."""
     value = seconds * 1e3
+    if value < 0.01:
+        return f"{value:.1g}" if value < 1e-4 else f"{value:.4f}"
     if value >= 100:
         return f"{value:,.0f}"
     return f"{value:.1f}" if value >= 10 else f"{value:.2f}" if value >= 1 else f"{value:.3f}"

@@ -81,6 +81,12 @@ class Case:
         """The leaf size with the least total."""
         return min(self.rows, key=lambda row: row.times["total"][1])
 
+    @property
+    def best_complete(self) -> Row | None:
+        """The leaf size with the least total among those that miss nothing."""
+        complete = [row for row in self.rows if not row.missed]
+        return min(complete, key=lambda row: row.times["total"][1], default=None)
+
 
 def run(
     models: Sequence[tuple[str, Model]],

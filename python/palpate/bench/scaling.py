@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -27,8 +27,17 @@ from palpate.mesh import Mesh
 from palpate.model import Model
 from palpate.scene import METHODS, Scene
 
+#: Markers of the models in plots, and as text.
+_SIGNS = {"o": "○", "s": "□", "d": "◇", "^": "△", "v": "▽"}
+
 #: Label of the pass that only streams the data.
 FLOOR = "memory floor"
+
+#: What is asked. A fixed distance spans more elements the finer the mesh is, and the pairs within it
+#: outgrow the triangles; a distance that shrinks with the edges keeps about as many per triangle.
+INTERSECTIONS = "intersections"
+PROXIMITY = "proximity, 1e-3 of the diagonal"
+PROXIMITY_BY_EDGE = "proximity, 1e-3 of the diagonal / n"
 
 #: Leaf size of the paper's method: near its best at every size of the default models.
 _PAPER_LEAF_SIZE = 50
@@ -163,7 +172,14 @@ def _measure(
     meshes = [refine(body.mesh, parts) for body in model.bodies]
     recorded = motion.record(motion.fields(model), meshes, frames)
     distance = CLOSE * motion.diagonal([body.mesh for body in model.bodies])
-    queries = {"intersections": measure.meeting(), "proximity": measure.within(distance)}
+    queries = {
+        INTERSECTIONS: measure.meeting(),
+        PROXIMITY: measure.within(distance),
+        PROXIMITY_BY_EDGE: measure.within(distance / parts),
+    }
+    if parts == 1:
+        # The same distance; measured once, told twice.
+        del queries[PROXIMITY_BY_EDGE]
     contenders: dict[tuple[str, str], Callable[[], measure.Pass]] = {}
     pairs: dict[tuple[str, str], float] = {}
     left_out = []
@@ -174,7 +190,7 @@ def _measure(
                 scene = Scene(meshes, method=method, leaf_size=leaf_size, threads=count)
                 hopeless = method == "all-pairs" and _all_pairs_time(query, meshes) > bearable
                 if hopeless or _first_frame(scene, recorded[0], find) > bearable:
-                    left_out.append(f"{query} by {method} on {name} in {parts} parts")
+                    left_out.append(f"{method} on {name} in {parts} parts ({query})")
                     break
                 key = f"{method}, {count} {'thread' if count == 1 else 'threads'}", query
                 contenders[key] = measure.scene_pass(scene, recorded, find)
@@ -185,7 +201,7 @@ def _measure(
     nodes = sum(len(mesh.nodes) for mesh in meshes)
     named = {f"{query}: {label}": (label, query) for label, query in contenders}
     timed = measure.measure({key: contenders[named[key]] for key in named}, repeats)
-    return [
+    made = [
         Measurement(
             model=name,
             divisions=parts,
@@ -197,13 +213,17 @@ def _measure(
             pairs=pairs.get((label, query), 0.0),
         )
         for key, (label, query) in named.items()
-    ], left_out
+    ]
+    if parts == 1:
+        same = [each for each in made if each.query == PROXIMITY]
+        made += [replace(each, query=PROXIMITY_BY_EDGE) for each in same]
+    return made, left_out
 
 
 def _all_pairs_time(query: str, meshes: Sequence[Mesh]) -> float:
     """A low estimate [s] of a frame of the double loop, so that hopeless ones are not tried."""
     triangles = sum(len(mesh.triangles) for mesh in meshes)
-    return (5e-9 if query == "intersections" else 5e-8) * triangles**2
+    return (5e-9 if query == INTERSECTIONS else 5e-8) * triangles**2
 
 
 def _first_frame(scene: Scene, frame: Any, find: measure.Find) -> float:
@@ -258,7 +278,7 @@ def _draw(results: Sequence[Measurement], path: Path) -> None:
     made, axes = plots.figure(1, len(queries), width=5.6, height=4.2)
     contenders = list(dict.fromkeys(each.contender for each in results))
     styles = {contender: plots.COLORS[i % 7] for i, contender in enumerate(contenders)}
-    markers = dict(zip(dict.fromkeys(each.model for each in results), "osd^v", strict=False))
+    markers = dict(zip(dict.fromkeys(each.model for each in results), _SIGNS, strict=False))
     for one, query in zip(axes[0], queries, strict=True):
         shown = [each for each in results if each.query == query]
         for model, marker in markers.items():
@@ -277,7 +297,8 @@ def _draw(results: Sequence[Measurement], path: Path) -> None:
                     triangles, median, marker=marker, ms=4, lw=1.3, color=color, label=name, **style
                 )
                 one.fill_between(triangles, low, high, color=color, alpha=0.2, linewidth=0)
-        plots.label(one, f"{query}, {' and '.join(markers)}", "surface triangles", "ms per frame")
+        drawn = ", ".join(f"{_SIGNS[marker]} {model}" for model, marker in markers.items())
+        plots.label(one, f"{query}    {drawn}", "surface triangles", "ms per frame")
         plots.logarithmic(one)
         one.legend(fontsize=7, frameon=False)
     plots.save(made, path)
@@ -302,6 +323,11 @@ def _report(
     yield (
         "The memory floor is the time to copy once what any method must read: 24 bytes per "
         "surface node, 12 bytes per triangle."
+    )
+    yield (
+        "Proximity is asked twice: within a fixed distance, which spans more elements the finer "
+        "the mesh is, so that the pairs outgrow the triangles; and within a distance that shrinks "
+        "with the edges."
     )
     if drawn:
         yield "![Time per frame over the number of triangles](scaling.png)"
@@ -348,8 +374,40 @@ def _report(
             ],
         )
     if left_out:
-        yield f"Left out, over {options['bearable']:g} s per frame: {'; '.join(left_out)}."
+        yield f"Left out, over {options['bearable']:g} s per frame: {_joined(left_out)}."
+    yield "## Threads"
     yield (
         f"Two threads gain {gain:.2f} x on work that shares nothing (sines in cache) in the same "
-        f"run."
+        f"run; the wide method's gain beside it:"
+    )
+    yield markdown_table(
+        "model<|n|triangles|query<|1 thread [ms]|2 threads [ms]|gain|of the machine's own gain",
+        _gains(results, gain),
+    )
+
+
+def _gains(results: Sequence[Measurement], gain: float) -> Iterator[list[Any]]:
+    by_key = {(each.model, each.divisions, each.query, each.contender): each for each in results}
+    for (model, parts, query, contender), one in by_key.items():
+        two = by_key.get((model, parts, query, "wide, 2 threads"))
+        if contender == "wide, 1 thread" and two is not None:
+            ratio = one.wall / two.wall
+            yield [
+                model,
+                parts,
+                whole(one.triangles),
+                query,
+                milliseconds(one.wall),
+                milliseconds(two.wall),
+                f"{ratio:.2f} x",
+                f"{ratio / gain:.0%}",
+            ]
+
+
+def _joined(left_out: Sequence[str]) -> str:
+    """Names of what is left out; a method that is left out everywhere stands once."""
+    methods = dict.fromkeys(each.split(" on ")[0] for each in left_out)
+    return "; ".join(
+        f"{method} ({sum(each.startswith(method + ' on ') for each in left_out)} times)"
+        for method in methods
     )
