@@ -33,7 +33,7 @@ _SIGNS = {"o": "○", "s": "□", "d": "◇", "^": "△", "v": "▽"}
 #: Label of the pass that only streams the data.
 FLOOR = "memory floor"
 
-#: What is asked. A fixed distance spans more elements the finer the mesh is, and the pairs within it
+#: What is asked. A fixed distance spans more elements the finer the mesh is, and its pairs
 #: outgrow the triangles; a distance that shrinks with the edges keeps about as many per triangle.
 INTERSECTIONS = "intersections"
 PROXIMITY = "proximity, 1e-3 of the diagonal"
