@@ -1,9 +1,12 @@
 //! Contact: from close pairs to forces that push bodies apart.
 
-mod active_set;
 pub(crate) mod compliance;
+mod coupling;
 pub(crate) mod filter;
+mod gauss_seidel;
 pub(crate) mod last_forces;
+mod law;
+mod node_compliance;
 pub(crate) mod problem;
 pub(crate) mod response;
 mod surface;

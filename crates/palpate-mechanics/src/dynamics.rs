@@ -66,11 +66,12 @@ pub struct StepStats {
     pub contacts: usize,
     /// Those of them within one body.
     pub self_contacts: usize,
-    /// Linear systems solved for the contact forces.
+    /// Sweeps over the contacts.
     pub iterations: usize,
-    /// Rounds of guessing which contacts push, stick and slide.
+    /// Solves for the contact forces: more than one when they brought about contacts that were not
+    /// expected.
     pub newton_iterations: usize,
-    /// Residual of the contact equations relative to their right-hand side.
+    /// Largest error of a gap or slip that the last solve left, in contact distances.
     pub residual: f64,
     /// Compliance columns that had to be solved.
     pub new_columns: usize,
@@ -318,9 +319,9 @@ impl Dynamics {
         stats.times.compliance += start.elapsed();
 
         let start = Instant::now();
-        let cost = response.solve(|body| self.body(body));
-        stats.iterations += cost.systems;
-        stats.newton_iterations += cost.rounds;
+        let cost = response.solve(self.pool.as_ref(), |body| self.body(body));
+        stats.iterations += cost.sweeps;
+        stats.newton_iterations += 1;
         stats.residual = cost.residual;
         stats.times.solve += start.elapsed();
     }

@@ -122,8 +122,8 @@ impl Turning {
         &self.rotations
     }
 
-    /// What P adds to the response of A^-1 alone to forces on some nodes: two vectors to hand to
-    /// [`Turning::displacement`].
+    /// What P adds to the response of A^-1 alone to forces on some nodes: a turn t and a counter-turn
+    /// c, by which a node moves `t x arm - response c`.
     pub(crate) fn coefficients(&self, loads: impl Iterator<Item = (u32, DVec3)>) -> [DVec3; 2] {
         let (mut torque, mut loaded) = (DVec3::ZERO, DVec3::ZERO);
         for (node, load) in loads {
@@ -136,11 +136,14 @@ impl Turning {
         [self.both * torque - s * loaded, s * torque]
     }
 
-    /// Displacement of a node that P adds.
-    pub(crate) fn displacement(&self, node: u32, [turn, counter]: [DVec3; 2]) -> DVec3 {
-        let [x, y, z] = columns(&self.loaded[node as usize]);
-        let counter = counter.x * x + counter.y * y + counter.z * z;
-        turn.cross(self.rotations.arms[node as usize]) - counter
+    /// Arm of a node about the centre, in the frame [m].
+    pub(crate) fn arm(&self, node: u32) -> DVec3 {
+        self.rotations.arms[node as usize]
+    }
+
+    /// Displacement of a node per counter-turn.
+    pub(crate) fn response(&self, node: u32) -> DMat3 {
+        DMat3::from_cols_array(&self.loaded[node as usize])
     }
 }
 
@@ -184,7 +187,8 @@ mod tests {
 
         let coefficients = turning.coefficients(loads.into_iter());
         for node in 0..5_u32 {
-            let mut sum = turning.displacement(node, coefficients);
+            let [turn, counter] = coefficients;
+            let mut sum = turn.cross(turning.arm(node)) - turning.response(node) * counter;
             for (loaded, load) in loads {
                 if loaded == node {
                     sum += softness[node as usize] * load;

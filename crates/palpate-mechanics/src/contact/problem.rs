@@ -4,247 +4,190 @@
 //! dual has one unknown force per contact and direction: `(D + W) lambda = s` over the contacts that
 //! push, with `W = J P J^T` from compliance columns. It is small and well conditioned however stiff
 //! the penalty is, and forces J^T lambda are equal and opposite exactly, converged or not.
+//!
+//! W is never put together: contacts couple through the bodies that they share, each in its frame.
 
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DVec3, Mat3, Vec3};
 use palpate_geometry::Point;
+use rayon::prelude::*;
 
+use super::coupling::{Corners, Coupling};
 use super::filter::Candidate;
+#[cfg(test)]
+use super::node_compliance::NodeCompliance;
 use super::side;
-use crate::body::MovingBody;
+use crate::body::{ElasticBody, MovingBody};
 
-const NONE: u32 = u32::MAX;
+/// One of the deformable bodies that a contact is on.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Place {
+    body: u32,
+    /// Which of the body's contacts this is.
+    contact: u32,
+    /// Axes of the contact in the frame of the body.
+    axes: Mat3,
+}
 
 /// The equations of one candidate: along its normal and, with friction, along two tangents.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Block {
-    /// First row.
-    pub(crate) first: u32,
-    /// Rows: 1 or 3.
-    pub(crate) rows: u32,
-    /// Normal and two tangents.
+    /// Normal and two tangents, along which the contact's own response is uncoupled.
     pub(crate) axes: DMat3,
     /// Relative displacement of the step along the axes without contact forces [m].
     pub(crate) free: DVec3,
-    /// Places of the four nodes among all contact nodes; the last place belongs to nodes that
-    /// do not give way (fixed or rigid).
-    places: [u32; 4],
+    /// Response of the contact to its own force, along the axes [m/N].
+    pub(super) own: DMat3,
+    places: [Place; 2],
+    place_count: u32,
 }
 
-/// Nodes of one body that candidates name.
+impl Block {
+    fn places(&self) -> &[Place] {
+        &self.places[..self.place_count as usize]
+    }
+}
+
+/// Part of the problem that belongs to one body.
 #[derive(Debug, Default)]
-struct BodyNodes {
+struct BodyPart {
+    /// Nodes that contacts of this step or of the last one can move, ascending.
     nodes: Vec<u32>,
-    /// Node -> place among all contact nodes.
-    places: Vec<u32>,
-    first: u32,
+    is_contact: Vec<bool>,
+    coupling: Coupling,
+    /// Where the displacements of its contacts begin.
+    first: usize,
 }
 
 /// Equations and compliance of the contact problem. Keeps its memory.
 #[derive(Debug, Default)]
 pub(crate) struct Problem {
-    bodies: Vec<BodyNodes>,
-    place_count: usize,
+    bodies: Vec<BodyPart>,
     blocks: Vec<Block>,
-    row_count: usize,
-    /// W, n x n, symmetric, all of it stored.
-    compliance: Vec<f64>,
-    /// Displacement of every contact node under unit forces along the axes of one candidate.
-    displacements: Vec<DMat3>,
-    /// Displacement of every contact node by the forces that were expected.
-    expected: Vec<DVec3>,
+    moved_len: usize,
 }
 
 impl Problem {
-    /// Collects the nodes of the candidates, body by body.
+    /// Collects the nodes of the candidates and of the expected forces, body by body.
     pub(crate) fn collect<'a>(
         &mut self,
         candidates: &[Candidate],
         body_count: usize,
         body: impl Fn(usize) -> &'a MovingBody,
     ) {
-        self.bodies.resize_with(body_count, BodyNodes::default);
+        self.bodies.resize_with(body_count, BodyPart::default);
         for (index, part) in self.bodies.iter_mut().enumerate() {
             for &node in &part.nodes {
-                part.places[node as usize] = NONE;
+                part.is_contact[node as usize] = false;
             }
             part.nodes.clear();
-            part.places.resize(body(index).positions.len(), NONE);
+            part.is_contact.resize(body(index).positions.len(), false);
         }
-        for candidate in candidates {
+        let mut add = |index: usize, node: u32, weight: f64| {
+            let part = &mut self.bodies[index];
+            if weight != 0.0 && !part.is_contact[node as usize] && gives_way(body(index), node) {
+                part.is_contact[node as usize] = true;
+                part.nodes.push(node);
+            }
+        };
+        for c in candidates {
             for corner in 0..4 {
-                let index = candidate.bodies[side(candidate.kind, corner)] as usize;
-                let node = candidate.nodes[corner];
-                let can_move = body(index).elastic().is_some_and(|b| b.is_free(node as usize));
-                let part = &mut self.bodies[index];
-                if can_move
-                    && candidate.weights[corner] != 0.0
-                    && part.places[node as usize] == NONE
-                {
-                    part.places[node as usize] = 0;
-                    part.nodes.push(node);
-                }
+                let index = c.bodies[side(c.kind, corner)] as usize;
+                add(index, c.nodes[corner], c.weights[corner]);
             }
         }
-        let mut place = 0;
+        for index in 0..body_count {
+            for (node, _) in body(index).expected_forces() {
+                add(index, node, 1.0);
+            }
+        }
         for part in &mut self.bodies {
             part.nodes.sort_unstable();
-            part.first = place;
-            for &node in &part.nodes {
-                part.places[node as usize] = place;
-                place += 1;
-            }
         }
-        self.place_count = place as usize;
     }
 
-    /// Nodes of a body that contacts of this step can move, ascending.
+    /// Nodes of a body that contacts of this step or the last one can move, ascending.
     pub(crate) fn nodes(&self, body: usize) -> &[u32] {
         &self.bodies[body].nodes
     }
 
-    /// Writes the equations of the candidates and fills W.
+    /// Writes the equations of the candidates. Every compliance column must be prepared.
     pub(crate) fn assemble<'a>(
         &mut self,
         candidates: &[Candidate],
-        body: impl Fn(usize) -> &'a MovingBody,
+        pool: Option<&rayon::ThreadPool>,
+        body: impl Fn(usize) -> &'a MovingBody + Sync,
     ) {
-        self.blocks.clear();
-        self.row_count = 0;
-        self.displace_as_expected(&body);
-        for candidate in candidates {
-            let (first, second) = candidate.normal.any_orthonormal_pair();
-            let axes = DMat3::from_cols(candidate.normal, first, second);
-            let rows = if candidate.friction > 0.0 { 3 } else { 1 };
-            let mut places = [self.place_count as u32; 4];
-            for (corner, own_place) in places.iter_mut().enumerate() {
-                let part = &self.bodies[candidate.bodies[side(candidate.kind, corner)] as usize];
-                let place = part.places[candidate.nodes[corner] as usize];
-                if place != NONE && candidate.weights[corner] != 0.0 {
-                    *own_place = place;
-                }
+        self.place_contacts(candidates, &body);
+        let fill = |(index, part): (usize, &mut BodyPart)| {
+            if !part.nodes.is_empty() {
+                part.assemble(body(index));
             }
-            let mut free = expected_displacement(candidate, &body);
-            for (&place, weight) in places.iter().zip(candidate.weights) {
-                free -= weight * self.expected[place as usize];
-            }
-            self.blocks.push(Block {
-                first: self.row_count as u32,
-                rows,
-                axes,
-                free: axes.transpose() * free,
-                places,
-            });
-            self.row_count += rows as usize;
+        };
+        match pool {
+            Some(pool) => pool.install(|| self.bodies.par_iter_mut().enumerate().for_each(fill)),
+            None => self.bodies.iter_mut().enumerate().for_each(fill),
         }
-        let count = self.row_count;
-        self.compliance.resize(count * count, 0.0);
-        self.displacements.clear();
-        self.displacements.resize(self.place_count + 1, DMat3::ZERO);
-        for (col, candidate) in candidates.iter().enumerate() {
-            let block = self.blocks[col];
-            let [first, second] = candidate.bodies;
-            self.displace(&block, candidate, first, &body);
-            if second != first {
-                self.displace(&block, candidate, second, &body);
+        self.moved_len = 0;
+        for part in &mut self.bodies {
+            part.first = self.moved_len;
+            self.moved_len += part.coupling.moved_len();
+        }
+        for (block, candidate) in self.blocks.iter_mut().zip(candidates) {
+            let mut own = DMat3::ZERO;
+            let mut moved = expected_displacement(candidate, &body);
+            for place in &block.places[..block.place_count as usize] {
+                let moving = body(place.body as usize);
+                let coupling = &self.bodies[place.body as usize].coupling;
+                let frame = frame(moving);
+                own += frame * coupling.own(place.contact) * frame.transpose();
+                moved -= frame * coupling.displacement(place.contact);
             }
-            for (other, row_block) in self.blocks.iter().enumerate().skip(col) {
-                let mut moved = DMat3::ZERO;
-                for (&place, weight) in row_block.places.iter().zip(candidates[other].weights) {
-                    if place as usize != self.place_count {
-                        moved += weight * self.displacements[place as usize];
-                    }
-                }
-                let values = row_block.axes.transpose() * moved;
-                let (from, to) = (block.first as usize, row_block.first as usize);
-                for k in 0..block.rows as usize {
-                    for l in 0..row_block.rows as usize {
-                        let value = values.col(k)[l];
-                        self.compliance[(from + k) * count + to + l] = value;
-                        self.compliance[(to + l) * count + from + k] = value;
-                    }
-                }
-            }
-            for body in candidate.bodies {
-                let part = &self.bodies[body as usize];
-                let first = part.first as usize;
-                self.displacements[first..first + part.nodes.len()].fill(DMat3::ZERO);
+            block.axes = principal_axes(candidate.normal, own);
+            block.own = block.axes.transpose() * own * block.axes;
+            block.free = block.axes.transpose() * moved;
+            for place in &mut block.places[..block.place_count as usize] {
+                let axes = frame(body(place.body as usize)).transpose() * block.axes;
+                place.axes = axes.as_mat3();
             }
         }
     }
 
-    /// Finds the displacements by the expected forces, which the expected positions contain.
-    fn displace_as_expected<'a>(&mut self, body: impl Fn(usize) -> &'a MovingBody) {
-        self.expected.clear();
-        self.expected.resize(self.place_count + 1, DVec3::ZERO);
-        for (index, part) in self.bodies.iter().enumerate() {
-            let moving = body(index);
-            let Some(elastic) = moving.elastic() else { continue };
-            if part.nodes.is_empty() {
-                continue;
-            }
-            let frame = elastic.frame();
-            let loads = || moving.expected_forces().map(|(node, f)| (node, frame.transpose() * f));
-            let moved = &mut self.expected[part.first as usize..][..part.nodes.len()];
-            for (node, load) in loads() {
-                let Some(column) = moving.compliance.column(node) else { continue };
-                for (moved, &node) in moved.iter_mut().zip(&part.nodes) {
-                    let entries = column[moving.compliance.place(node) as usize].map(f64::from);
-                    *moved += DMat3::from_cols_array(&entries) * load;
-                }
-            }
-            if let Some(turning) = elastic.turning() {
-                let coefficients = turning.coefficients(loads());
-                for (moved, &node) in moved.iter_mut().zip(&part.nodes) {
-                    *moved += turning.displacement(node, coefficients);
-                }
-            }
-            for moved in moved {
-                *moved = frame * *moved;
-            }
-        }
-    }
-
-    /// Displacements of a body's contact nodes under unit forces along the axes of a candidate.
-    fn displace<'a>(
+    /// Tells every body which contacts are on it.
+    fn place_contacts<'a>(
         &mut self,
-        block: &Block,
-        candidate: &Candidate,
-        index: u32,
-        body: impl Fn(usize) -> &'a MovingBody,
+        candidates: &[Candidate],
+        body: &impl Fn(usize) -> &'a MovingBody,
     ) {
-        let moving = body(index as usize);
-        let Some(elastic) = moving.elastic() else { return };
-        let frame = elastic.frame();
-        let loads = frame.transpose() * block.axes;
-        let part = &self.bodies[index as usize];
-        let moved = &mut self.displacements[part.first as usize..][..part.nodes.len()];
-        let corners = (0..4).filter(|&corner| {
-            candidate.bodies[side(candidate.kind, corner)] == index
-                && block.places[corner] as usize != self.place_count
-        });
-        for corner in corners.clone() {
-            let cache = &moving.compliance;
-            let column = cache.column(candidate.nodes[corner]).expect("prepared column");
-            let loads = candidate.weights[corner] * loads;
-            for (moved, &node) in moved.iter_mut().zip(&part.nodes) {
-                let entries = column[cache.place(node) as usize].map(f64::from);
-                *moved += DMat3::from_cols_array(&entries) * loads;
-            }
+        for part in &mut self.bodies {
+            part.coupling.clear();
         }
-        if let Some(turning) = elastic.turning() {
-            let coefficients = loads.to_cols_array_2d().map(|load| {
-                let load = DVec3::from_array(load);
-                let loaded =
-                    corners.clone().map(|c| (candidate.nodes[c], candidate.weights[c] * load));
-                turning.coefficients(loaded)
-            });
-            for (moved, &node) in moved.iter_mut().zip(&part.nodes) {
-                let [x, y, z] = coefficients.map(|pair| turning.displacement(node, pair));
-                *moved += DMat3::from_cols(x, y, z);
+        self.blocks.clear();
+        for c in candidates {
+            let mut block = Block {
+                axes: DMat3::IDENTITY,
+                free: DVec3::ZERO,
+                own: DMat3::ZERO,
+                places: [Place::default(); 2],
+                place_count: 0,
+            };
+            let bodies = if c.bodies[0] == c.bodies[1] { &c.bodies[..1] } else { &c.bodies[..] };
+            for &index in bodies {
+                let mut corners = Corners::default();
+                for corner in 0..4 {
+                    let (node, weight) = (c.nodes[corner], c.weights[corner]);
+                    let here = c.bodies[side(c.kind, corner)] == index;
+                    if here && weight != 0.0 && gives_way(body(index as usize), node) {
+                        corners.push(node, weight);
+                    }
+                }
+                if !corners.is_empty() {
+                    let contact = self.bodies[index as usize].coupling.push(corners);
+                    block.places[block.place_count as usize] =
+                        Place { body: index, contact, axes: Mat3::IDENTITY };
+                    block.place_count += 1;
+                }
             }
-        }
-        for moved in moved {
-            *moved = frame * *moved;
+            self.blocks.push(block);
         }
     }
 
@@ -252,33 +195,83 @@ impl Problem {
         &self.blocks
     }
 
-    pub(crate) fn row_count(&self) -> usize {
-        self.row_count
+    /// Length of the array of displacements that [`Problem::moved`] reads.
+    pub(super) fn moved_len(&self) -> usize {
+        self.moved_len
     }
 
-    /// W, row after row.
-    pub(crate) fn compliance(&self) -> &[f64] {
-        &self.compliance[..self.row_count * self.row_count]
+    /// Displacement of a contact along its axes [m].
+    pub(super) fn moved(&self, block: &Block, moved: &[f32]) -> Vec3 {
+        let mut sum = Vec3::ZERO;
+        for place in block.places() {
+            let part = &self.bodies[place.body as usize];
+            let own = part.coupling.moved(place.contact, &moved[part.first..]);
+            sum += place.axes.transpose() * own;
+        }
+        sum
     }
 
-    /// A problem of given W and free displacements along the axes; every block has one row or three.
+    /// Adds to the displacements what a force along the axes of a contact does [N].
+    pub(super) fn add_force(&self, block: &Block, force: Vec3, moved: &mut [f32]) {
+        for place in block.places() {
+            let part = &self.bodies[place.body as usize];
+            let moved = &mut moved[part.first..][..part.coupling.moved_len()];
+            part.coupling.add_force(place.contact, place.axes * force, moved);
+        }
+    }
+
+    /// A problem of given W, three rows per contact, and free displacements along the axes.
     #[cfg(test)]
-    pub(super) fn with_compliance(compliance: Vec<f64>, free: &[DVec3], rows: u32) -> Self {
-        let block = |(index, &free): (usize, &DVec3)| Block {
-            first: index as u32 * rows,
-            rows,
-            axes: DMat3::IDENTITY,
-            free,
-            places: [0; 4],
+    pub(super) fn with_compliance(compliance: &[f64], free: &[DVec3]) -> Self {
+        let rows = 3 * free.len();
+        let nodes = NodeCompliance::with_entries(free.len(), |moved, loaded| {
+            std::array::from_fn(|e| {
+                compliance[(3 * moved + e % 3) * rows + 3 * loaded + e / 3] as f32
+            })
+        });
+        let coupling = Coupling::with_nodes(nodes, free.len());
+        let block = |(index, &free): (usize, &DVec3)| {
+            let place = Place { body: 0, contact: index as u32, axes: Mat3::IDENTITY };
+            Block {
+                axes: DMat3::IDENTITY,
+                free,
+                own: coupling.own(index as u32),
+                places: [place; 2],
+                place_count: 1,
+            }
         };
         let blocks = free.iter().enumerate().map(block).collect();
-        Self { blocks, row_count: free.len() * rows as usize, compliance, ..Self::default() }
+        let moved_len = coupling.moved_len();
+        Self { blocks, bodies: vec![BodyPart { coupling, ..BodyPart::default() }], moved_len }
     }
+}
 
-    /// Row `row` of W.
-    pub(crate) fn compliance_row(&self, row: usize) -> &[f64] {
-        &self.compliance[row * self.row_count..][..self.row_count]
+impl BodyPart {
+    fn assemble(&mut self, body: &MovingBody) {
+        let to_frame = frame(body).transpose();
+        let is_contact = &self.is_contact;
+        let forces = body.expected_forces().filter(|&(node, _)| is_contact[node as usize]);
+        let forces = forces.map(|(node, force)| (node, to_frame * force));
+        self.coupling.assemble(body, &self.nodes, forces);
     }
+}
+
+fn frame(body: &MovingBody) -> DMat3 {
+    body.elastic().map_or(DMat3::IDENTITY, ElasticBody::frame)
+}
+
+/// Whether contact forces can move a node.
+fn gives_way(body: &MovingBody, node: u32) -> bool {
+    body.elastic().is_some_and(|elastic| elastic.is_free(node as usize))
+}
+
+/// The normal and the two tangents along which `own` is uncoupled.
+fn principal_axes(normal: DVec3, own: DMat3) -> DMat3 {
+    let (first, second) = normal.any_orthonormal_pair();
+    let (a, b, c) = (first.dot(own * first), second.dot(own * second), first.dot(own * second));
+    let angle = 0.5 * (2.0 * c).atan2(a - b);
+    let (sin, cos) = angle.sin_cos();
+    DMat3::from_cols(normal, cos * first + sin * second, cos * second - sin * first)
 }
 
 /// Relative displacement of the two sides in the step if contact forces stayed as they were [m].

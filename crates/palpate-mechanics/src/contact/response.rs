@@ -4,8 +4,8 @@ use glam::DVec3;
 use palpate_contact::{PenetratingNode, ProximityPair};
 
 use super::Contact;
-use super::active_set::{ActiveSet, SolveCost};
 use super::filter::{BodyView, Candidate, Filter};
+use super::gauss_seidel::{Effort, GaussSeidel, SolveCost};
 use super::last_forces::LastForces;
 use super::problem::{Problem, expected_displacement, step_displacement};
 use super::side;
@@ -25,7 +25,7 @@ pub(crate) struct Response {
     /// Pairs that the expected motion does not bring close enough to count.
     spare: Vec<Candidate>,
     problem: Problem,
-    active_set: ActiveSet,
+    solver: GaussSeidel,
     contacts: Vec<Contact>,
     last: LastForces,
     /// Forces found so far in this step, where the solve begins.
@@ -99,24 +99,29 @@ impl Response {
     }
 
     /// Solves for the forces of the candidates; every compliance column must be prepared.
-    pub(crate) fn solve<'a>(&mut self, body: impl Fn(usize) -> &'a MovingBody) -> SolveCost {
+    pub(crate) fn solve<'a>(
+        &mut self,
+        pool: Option<&rayon::ThreadPool>,
+        body: impl Fn(usize) -> &'a MovingBody + Sync,
+    ) -> SolveCost {
         if self.candidates.is_empty() {
             return SolveCost::default();
         }
-        self.problem.assemble(&self.candidates, &body);
+        self.problem.assemble(&self.candidates, pool, &body);
         let (problem, candidates, known) = (&self.problem, &self.candidates, &self.guess);
         let guess = |index: usize| {
             let force = known.force_of(&candidates[index]);
             problem.blocks()[index].axes.transpose() * force
         };
-        let cost = self.active_set.solve(problem, candidates, guess);
+        let cost = self.solver.solve(problem, candidates, Effort::default(), guess);
         self.report(body);
         cost
     }
 
     fn report<'a>(&mut self, body: impl Fn(usize) -> &'a MovingBody) {
-        for (candidate, block) in self.candidates.iter().zip(self.problem.blocks()) {
-            let force = self.active_set.force(block);
+        let blocks = self.problem.blocks();
+        for (index, (candidate, block)) in self.candidates.iter().zip(blocks).enumerate() {
+            let force = self.solver.force(index);
             if force.x <= 0.0 {
                 continue;
             }
@@ -134,7 +139,7 @@ impl Response {
                 weights: candidate.weights,
                 normal: candidate.normal.to_array(),
                 point: point.to_array(),
-                gap: candidate.gap + block.free.x + self.active_set.moved(block).x,
+                gap: candidate.gap + block.free.x + self.solver.moved(&self.problem, block).x,
                 normal_force: force.x,
                 friction_force: friction.to_array(),
             });

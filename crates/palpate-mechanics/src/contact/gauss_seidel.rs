@@ -1,0 +1,119 @@
+//! Which contacts push, and how hard; how much they rub.
+//!
+//! Block Gauss-Seidel (nonsmooth contact dynamics, Jean 1999) gives contact after contact the force
+//! that its own laws ask for, given all others. Forces of the last step are a good start, and what a
+//! bounded number of sweeps leaves, the next step corrects.
+
+use glam::DVec3;
+
+use super::filter::Candidate;
+use super::law::Law;
+use super::problem::{Block, Problem};
+
+/// How long to go on.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Effort {
+    /// Sweeps at least and at most.
+    pub(crate) sweeps: [usize; 2],
+    /// Sweeps end when no contact is farther than this from its laws, in contact distances.
+    pub(crate) tolerance: f64,
+}
+
+impl Default for Effort {
+    fn default() -> Self {
+        Self { sweeps: [2, 50], tolerance: 1e-3 }
+    }
+}
+
+/// What a solution took.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct SolveCost {
+    /// Sweeps.
+    pub(crate) sweeps: usize,
+    /// Largest violation of a contact's laws that is left, in contact distances.
+    pub(crate) residual: f64,
+}
+
+/// Solver of contact problems. Keeps its memory.
+#[derive(Default)]
+pub(crate) struct GaussSeidel {
+    laws: Vec<Law>,
+    /// Force along the axes of each contact [N].
+    forces: Vec<DVec3>,
+    /// Displacements by all forces, as [`Problem`] has them [m].
+    moved: Vec<f32>,
+}
+
+impl GaussSeidel {
+    /// Force of a contact along its axes [N].
+    pub(crate) fn force(&self, contact: usize) -> DVec3 {
+        self.forces[contact]
+    }
+
+    /// Displacement of a contact along its axes by all contact forces [m].
+    pub(crate) fn moved(&self, problem: &Problem, block: &Block) -> DVec3 {
+        problem.moved(block, &self.moved).as_dvec3()
+    }
+
+    /// Solves for the forces of all candidates, beginning with `guess` along their axes.
+    pub(crate) fn solve(
+        &mut self,
+        problem: &Problem,
+        candidates: &[Candidate],
+        effort: Effort,
+        guess: impl Fn(usize) -> DVec3,
+    ) -> SolveCost {
+        let blocks = problem.blocks();
+        self.laws.clear();
+        self.laws.extend(candidates.iter().zip(blocks).map(|(c, block)| Law::new(c, block)));
+        self.forces.clear();
+        let guesses = self.laws.iter().enumerate();
+        self.forces.extend(guesses.map(|(index, law)| law.admissible(guess(index))));
+        self.update_moved(problem);
+        let mut cost = SolveCost::default();
+        while cost.sweeps < effort.sweeps[1] {
+            let violation = self.sweep(problem);
+            cost.sweeps += 1;
+            if violation <= effort.tolerance && cost.sweeps >= effort.sweeps[0] {
+                break;
+            }
+        }
+        cost.residual = self.violation(problem);
+        cost
+    }
+
+    fn update_moved(&mut self, problem: &Problem) {
+        self.moved.clear();
+        self.moved.resize(problem.moved_len(), 0.0);
+        for (block, force) in problem.blocks().iter().zip(&self.forces) {
+            if *force != DVec3::ZERO {
+                problem.add_force(block, force.as_vec3(), &mut self.moved);
+            }
+        }
+    }
+
+    /// Gives every contact in turn the force that its laws ask for; returns the largest violation met.
+    fn sweep(&mut self, problem: &Problem) -> f64 {
+        let mut largest = 0.0_f64;
+        for ((block, law), force) in problem.blocks().iter().zip(&self.laws).zip(&mut self.forces) {
+            let moved = problem.moved(block, &self.moved).as_dvec3();
+            largest = largest.max(law.violation(*force, moved));
+            let answer = law.answer(*force, moved);
+            if answer != *force {
+                problem.add_force(block, (answer - *force).as_vec3(), &mut self.moved);
+                *force = answer;
+            }
+        }
+        largest
+    }
+
+    /// Largest violation of a contact's laws, in contact distances.
+    fn violation(&self, problem: &Problem) -> f64 {
+        let contacts = problem.blocks().iter().zip(&self.laws).zip(&self.forces);
+        contacts
+            .map(|((block, law), &force)| {
+                law.violation(force, problem.moved(block, &self.moved).as_dvec3())
+            })
+            .fold(0.0, f64::max)
+    }
+}
