@@ -9,7 +9,7 @@ SOURCES := pyproject.toml Cargo.toml Cargo.lock $(shell find crates -name '*.rs'
 CRATES := --workspace --exclude palpate-python
 
 .DEFAULT_GOAL := help
-.PHONY: help install run test test-rust test-python lint format bench models clean
+.PHONY: help install run test test-rust test-python soak lint format bench models clean
 
 help: ## Show this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /\1\t/' | expand -t 14
@@ -34,6 +34,15 @@ test-rust:
 
 test-python: install
 	$(BIN)/python -m pytest
+
+soak: ## Compare with the double loop on fresh random scenes for MINUTES (10)
+	PALPATE_SOAK=$(or $(MINUTES),10) cargo test --release --locked -p palpate-contact \
+		--test soak --test wide -- --nocapture
+
+bench: ## Time each stage of detection; count its instructions with valgrind
+	cargo bench --locked -p palpate-contact --bench stages
+	cargo build --release --locked -p palpate-contact --example stage_count
+	$(PYTHON) benchmarks/instructions.py $${CARGO_TARGET_DIR:-target}/release/examples/stage_count
 
 lint: install ## Check format, clippy, rustdoc, ruff and types
 	cargo fmt --all --check

@@ -4,7 +4,9 @@
 #[expect(dead_code, reason = "the other tests use the rest")]
 mod scenes;
 
+use std::io::Write;
 use std::sync::Arc;
+use std::time::{SystemTime, UNIX_EPOCH};
 
 use palpate_contact::{IntersectionOptions, Method, Scene, SceneOptions};
 use palpate_model::{Mesh, MeshData};
@@ -60,11 +62,23 @@ fn place(meshes: &[Arc<Mesh>], random: &mut Random) -> Positions {
     meshes.iter().map(|mesh| mesh.nodes().iter().map(&mut point).collect()).collect()
 }
 
+/// With `PALPATE_SOAK`, see `tests/soak.rs`, ten times as many, of a fresh seed that is printed.
 #[test]
 fn very_many_small_scenes_have_the_pairs_of_the_double_loop() {
-    let mut random = Random(2008);
+    if std::env::var_os("PALPATE_SOAK").is_none() {
+        compare_small_scenes(2008, SCENES);
+        return;
+    }
+    let since_epoch = SystemTime::now().duration_since(UNIX_EPOCH).expect("after 1970");
+    let seed = since_epoch.as_nanos() as u64;
+    writeln!(std::io::stderr(), "small scenes of seed {seed}").expect("an open stderr");
+    compare_small_scenes(seed, 10 * SCENES);
+}
+
+fn compare_small_scenes(seed: u64, scenes: usize) {
+    let mut random = Random(seed);
     let (mut meeting, mut close) = (0, 0);
-    for _ in 0..SCENES / FRAMES {
+    for _ in 0..scenes / FRAMES {
         let first = 1 + below(&mut random, 15);
         let meshes = [patch(first, &mut random), patch(1 + below(&mut random, 15), &mut random)];
         let of = |method| {
@@ -93,7 +107,7 @@ fn very_many_small_scenes_have_the_pairs_of_the_double_loop() {
             }
         }
     }
-    assert!(meeting > SCENES && close > SCENES, "{meeting} {close}");
+    assert!(meeting > scenes && close > scenes, "{meeting} {close}");
 }
 
 #[test]
