@@ -48,6 +48,10 @@ impl Adjacency {
         same: bool,
     ) -> Self {
         let mut adjacency = Self::default();
+        // About what surfaces need.
+        let expected = 6 * a.boxes.level(0).len();
+        adjacency.seconds.reserve(expected);
+        adjacency.apart.reserve(expected);
         let mut row = Row::new(b.boxes.level(0).len());
         let mut parents = Row::new(b.boxes.level(1).len());
         // The last block that a node was seen in, plus one.
@@ -66,7 +70,7 @@ impl Adjacency {
                     }
                 }
             }
-            for (i, &(second, sharing)) in row.entries.iter().enumerate() {
+            for (i, &(second, sharing)) in row.entries().iter().enumerate() {
                 let mut apart = products(a.lanes(first), b.lanes(second as usize)) & !sharing;
                 if same && second as usize == first {
                     apart &= UPPER;
@@ -79,20 +83,22 @@ impl Adjacency {
                 let bit = first % WIDTH * WIDTH + second as usize % WIDTH;
                 parents.add(second / WIDTH as u32, 1 << bit);
             }
-            row.clear();
+            row.count = 0;
             if first % WIDTH == WIDTH - 1 || first + 1 == blocks.len() {
                 adjacency.push_parents(&mut parents);
             }
         }
         adjacency.parent_rows.push(adjacency.parents.len() as u32);
+        adjacency.seconds.shrink_to_fit();
+        adjacency.apart.shrink_to_fit();
         adjacency
     }
 
     fn push_parents(&mut self, row: &mut Row) {
         self.parent_rows.push(self.parents.len() as u32);
-        self.parents.extend(row.entries.iter().map(|entry| entry.0));
-        self.child_pairs.extend(row.entries.iter().map(|entry| entry.1));
-        row.clear();
+        self.parents.extend(row.entries().iter().map(|entry| entry.0));
+        self.child_pairs.extend(row.entries().iter().map(|entry| entry.1));
+        row.count = 0;
     }
 
     /// Number of pairs.
@@ -165,47 +171,43 @@ impl Seconds<'_> {
 /// The blocks that each node is a corner in.
 #[derive(Debug)]
 pub(super) struct Incidence {
-    rows: Vec<u32>,
+    /// Where a node's blocks begin, room for as many as it has elements, and where they end.
+    rows: Vec<[u32; 2]>,
     /// The block, and in which lanes the node is.
     blocks: Vec<(u32, u8)>,
 }
 
 impl Incidence {
     pub(super) fn new<const N: usize>(elements: &Hierarchy<N>, node_count: usize) -> Self {
-        // Per node the last block that was counted, plus one; counts, later rows, two places on.
-        let mut last = vec![0; node_count];
-        let mut rows = vec![0; node_count + 2];
-        let slots = || elements.corners[..elements.count].iter().enumerate();
-        for (slot, corners) in slots() {
-            let block = (slot / WIDTH) as u32 + 1;
-            for &node in corners {
-                if std::mem::replace(&mut last[node as usize], block) != block {
-                    rows[node as usize + 2] += 1;
-                }
-            }
+        let corners = &elements.corners[..elements.count];
+        let mut rows = vec![[0; 2]; node_count];
+        for &node in corners.as_flattened() {
+            rows[node as usize][1] += 1;
         }
-        for node in 0..node_count {
-            rows[node + 2] += rows[node + 1];
+        // From one on: before a node's first block stands one that is none of its.
+        let mut total = 1;
+        for row in &mut rows {
+            let count = row[1];
+            *row = [total; 2];
+            total += count;
         }
-        let mut blocks = vec![(0, 0); rows[node_count + 1] as usize];
-        last.fill(0);
-        for (slot, corners) in slots() {
+        let mut blocks = vec![(u32::MAX, 0); total as usize];
+        for (slot, corners) in corners.iter().enumerate() {
             let (block, lane) = ((slot / WIDTH) as u32, slot % WIDTH);
             for &node in corners {
-                let next = &mut rows[node as usize + 1];
-                if std::mem::replace(&mut last[node as usize], block + 1) != block + 1 {
-                    blocks[*next as usize].0 = block;
-                    *next += 1;
-                }
-                blocks[*next as usize - 1].1 |= 1 << lane;
+                let [start, end] = &mut rows[node as usize];
+                let (last, lanes) = blocks[*end as usize - 1];
+                // Without branches: whether a block is new cannot be foreseen.
+                let new = last != block || start == end;
+                *end += u32::from(new);
+                blocks[*end as usize - 1] = (block, if new { 0 } else { lanes } | 1 << lane);
             }
         }
-        rows.pop();
         Self { rows, blocks }
     }
 
     fn blocks(&self, node: u32) -> &[(u32, u8)] {
-        let [start, end] = [self.rows[node as usize], self.rows[node as usize + 1]];
+        let [start, end] = self.rows[node as usize];
         &self.blocks[start as usize..end as usize]
     }
 
@@ -217,29 +219,31 @@ impl Incidence {
 
 /// Masks by block, of few of all blocks.
 struct Row {
+    /// Room for one of each block and one more.
     entries: Vec<(u32, u64)>,
+    count: usize,
     /// Per block where its entry is, if that one is its.
     places: Vec<u32>,
 }
 
 impl Row {
     fn new(block_count: usize) -> Self {
-        Self { entries: Vec::new(), places: vec![0; block_count] }
+        Self { entries: vec![(0, 0); block_count + 1], count: 0, places: vec![0; block_count] }
     }
 
+    /// Without branches: whether a block is known cannot be foreseen.
     fn add(&mut self, block: u32, mask: u64) {
-        let place = &mut self.places[block as usize];
-        match self.entries.get_mut(*place as usize) {
-            Some(entry) if entry.0 == block => entry.1 |= mask,
-            _ => {
-                *place = self.entries.len() as u32;
-                self.entries.push((block, mask));
-            }
-        }
+        let place = self.places[block as usize];
+        let (other, former) = self.entries[place as usize];
+        let known = (other == block) & ((place as usize) < self.count);
+        let place = if known { place } else { self.count as u32 };
+        self.places[block as usize] = place;
+        self.entries[place as usize] = (block, if known { former } else { 0 } | mask);
+        self.count += usize::from(!known);
     }
 
-    fn clear(&mut self) {
-        self.entries.clear();
+    fn entries(&self) -> &[(u32, u64)] {
+        &self.entries[..self.count]
     }
 }
 

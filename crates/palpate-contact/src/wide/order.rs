@@ -34,7 +34,7 @@ pub(super) fn block_order(centers: &[Point]) -> Vec<u32> {
         } else {
             // Ties by index: the same order on every machine.
             range.select_nth_unstable_by_key(count, |placed| {
-                u64::from(key(placed[axis])) << 32 | u64::from(placed[3].to_bits())
+                i64::from(key(placed[axis])) << 32 | i64::from(placed[3].to_bits())
             });
         }
         pending.push((start, start + count));
@@ -46,7 +46,7 @@ pub(super) fn block_order(centers: &[Point]) -> Vec<u32> {
 /// Brings the `count` least along `axis` to the front; of equal ones those that stand first.
 fn split_few(range: &mut [Placed], axis: usize, count: usize) {
     // Padded with the largest key: behind all others in rank.
-    let mut keys = [u32::MAX; FEW];
+    let mut keys = [i32::MAX; FEW];
     for (key_of, placed) in keys.iter_mut().zip(range.iter()) {
         *key_of = key(placed[axis]);
     }
@@ -63,9 +63,10 @@ fn split_few(range: &mut [Placed], axis: usize, count: usize) {
 }
 
 /// A number that orders as `value` does.
-fn key(value: f32) -> u32 {
-    let bits = value.to_bits();
-    if bits >> 31 == 0 { bits | 1 << 31 } else { !bits }
+fn key(value: f32) -> i32 {
+    let bits = value.to_bits() as i32;
+    // Of negative numbers all bits but the sign the other way round.
+    bits ^ (bits >> 31) & i32::MAX
 }
 
 fn longest_axis(range: &[Placed]) -> usize {
