@@ -235,7 +235,7 @@ impl Row {
     fn add(&mut self, block: u32, mask: u64) {
         let place = self.places[block as usize];
         let (other, former) = self.entries[place as usize];
-        let known = (other == block) & ((place as usize) < self.count);
+        let known = other == block && (place as usize) < self.count;
         let place = if known { place } else { self.count as u32 };
         self.places[block as usize] = place;
         self.entries[place as usize] = (block, if known { former } else { 0 } | mask);
