@@ -35,7 +35,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut dynamics = Dynamics::new(&model, DynamicsOptions::default())?;
     let mut scene = Scene::new(meshes, Some(&model.structure), SceneOptions::default())?;
     println!(
-        "step contacts candidates rounds systems  residual  max m/s | detect predict filter \
+        "step contacts candidates solves changes  residual  max m/s | detect predict filter \
          compliance solve advance = mechanics [ms]"
     );
     let (mut mechanics, mut detection) = (Vec::new(), Vec::new());

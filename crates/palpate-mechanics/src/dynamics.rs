@@ -66,7 +66,7 @@ pub struct StepStats {
     pub contacts: usize,
     /// Those of them within one body.
     pub self_contacts: usize,
-    /// Sweeps over the contacts.
+    /// Changes of a contact force until all contacts obeyed their laws.
     pub iterations: usize,
     /// Solves for the contact forces: more than one when they brought about contacts that were not
     /// expected.
@@ -320,7 +320,8 @@ impl Dynamics {
 
         let start = Instant::now();
         let cost = response.solve(self.pool.as_ref(), |body| self.body(body));
-        stats.iterations += cost.sweeps;
+        stats.iterations += cost.changes;
+
         stats.newton_iterations += 1;
         stats.residual = cost.residual;
         stats.times.solve += start.elapsed();

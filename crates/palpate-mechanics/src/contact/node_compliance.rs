@@ -6,13 +6,17 @@ const NONE: u32 = u32::MAX;
 /// Vectors of f32 that any machine has divide this.
 pub(super) const LANES: usize = 16;
 
+/// Slots beyond those that are used, as a part of these, before they are given up.
+const SPARE: f64 = 0.5;
+
 /// Displacements of contact nodes under unit forces on contact nodes, in the body's frame. Nodes keep
 /// their slots from step to step, so that only new ones are gathered.
 #[derive(Debug, Default)]
 pub(super) struct NodeCompliance {
     slot_of: Vec<u32>,
-    /// Slot -> node.
+    /// Slot -> node; [`NONE`] where there is none.
     nodes: Vec<u32>,
+    is_used: Vec<bool>,
     stride: usize,
     /// Slot k: nine stretches of `stride` entries; entry l of stretch `3 * axis + i` is the
     /// displacement along i of the node in slot l under a unit force along axis on that in slot k.
@@ -23,40 +27,72 @@ impl NodeCompliance {
     /// Makes room for `nodes`, whose columns are prepared in `cache`.
     pub(super) fn gather(&mut self, cache: &ComplianceCache, node_count: usize, nodes: &[u32]) {
         self.slot_of.resize(node_count, NONE);
-        let new = nodes.iter().filter(|&&node| self.slot_of[node as usize] == NONE).count();
-        if new == 0 {
-            return;
+        let limit = nodes.len() + (SPARE * nodes.len() as f64) as usize;
+        if nodes.len() > self.stride || self.stride > limit.next_multiple_of(LANES) {
+            self.resize(nodes.len());
         }
-        let known = self.nodes.iter().all(|&node| cache.column(node).is_some());
-        if self.nodes.len() + new > self.stride || !known {
-            for &node in &self.nodes {
-                self.slot_of[node as usize] = NONE;
-            }
-            self.nodes.clear();
-            if nodes.len() > self.stride {
-                self.stride = (nodes.len() + nodes.len() / 2).next_multiple_of(LANES);
-                self.values.resize(9 * self.stride * self.stride, 0.0);
+        self.is_used.clear();
+        self.is_used.resize(self.nodes.len(), false);
+        for &node in nodes {
+            if let Some(used) = self.is_used.get_mut(self.slot_of[node as usize] as usize) {
+                *used = true;
             }
         }
+        let mut next = 0;
         for &node in nodes {
             if self.slot_of[node as usize] == NONE {
-                self.insert(cache, node);
+                while self.is_used.get(next) == Some(&true) {
+                    next += 1;
+                }
+                self.insert(cache, node, next);
+                next += 1;
             }
         }
     }
 
+    /// Gives up all slots and makes room for `count` and a few more.
+    fn resize(&mut self, count: usize) {
+        for &node in self.nodes.iter().filter(|&&node| node != NONE) {
+            self.slot_of[node as usize] = NONE;
+        }
+        self.nodes.clear();
+        self.stride = (count + count / 8).next_multiple_of(LANES);
+        self.values.clear();
+        self.values.resize(9 * self.stride * self.stride, 0.0);
+    }
+
+    /// Gives a slot that is not used, or the first one beyond them, to a node.
+    ///
     /// The column of the smaller node serves both directions: what was gathered first makes no
     /// difference then.
-    fn insert(&mut self, cache: &ComplianceCache, node: u32) {
-        let (slot, stride) = (self.nodes.len(), self.stride);
+    fn insert(&mut self, cache: &ComplianceCache, node: u32, slot: usize) {
+        if slot == self.nodes.len() {
+            self.nodes.push(node);
+            self.is_used.push(true);
+        } else {
+            let old = std::mem::replace(&mut self.nodes[slot], node);
+            if old != NONE {
+                self.slot_of[old as usize] = NONE;
+            }
+            self.is_used[slot] = true;
+        }
         self.slot_of[node as usize] = slot as u32;
-        self.nodes.push(node);
+        let stride = self.stride;
         let own = cache.column(node).expect("prepared column");
-        for (other_slot, &other) in self.nodes.iter().enumerate() {
+        for other_slot in 0..self.nodes.len() {
+            let other = self.nodes[other_slot];
+            if other == NONE {
+                continue;
+            }
             let entries = if node <= other {
                 own[cache.place(other) as usize]
+            } else if let Some(column) = cache.column(other) {
+                transposed(&column[cache.place(node) as usize])
             } else {
-                transposed(&cache.column(other).expect("known column")[cache.place(node) as usize])
+                // Not used, and its column was given up since.
+                self.slot_of[other as usize] = NONE;
+                self.nodes[other_slot] = NONE;
+                continue;
             };
             let turned = transposed(&entries);
             for e in 0..9 {
@@ -79,7 +115,8 @@ impl NodeCompliance {
                 }
             }
         }
-        Self { slot_of: nodes.clone(), nodes, stride, values }
+        let is_used = vec![true; count];
+        Self { slot_of: nodes.clone(), nodes, is_used, stride, values }
     }
 
     /// Slot of a node that was gathered.
@@ -106,4 +143,60 @@ impl NodeCompliance {
 
 fn transposed(entries: &[f32; 9]) -> [f32; 9] {
     std::array::from_fn(|e| entries[3 * (e % 3) + e / 3])
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::TAU;
+    use std::sync::Arc;
+
+    use palpate_model::{Body, Mesh, MeshData};
+
+    use super::*;
+    use crate::body::MovingBody;
+
+    /// Tetrahedra around a common edge.
+    fn wheel(count: u32) -> MovingBody {
+        let mut data = MeshData { nodes: vec![[0.0; 3], [0.0, 0.0, 0.02]], ..MeshData::default() };
+        for rim in 0..count {
+            let angle = TAU * f64::from(rim) / f64::from(count);
+            data.nodes.push([0.03 * angle.cos(), 0.03 * angle.sin(), 0.01]);
+            data.tetrahedra.push([0, 2 + rim, 2 + (rim + 1) % count, 1]);
+        }
+        let body = Body::new("wheel", Arc::new(Mesh::new(data).unwrap()));
+        MovingBody::new(0, &body, [0.0; 3], 0.01).unwrap()
+    }
+
+    #[test]
+    fn slots_that_stay_and_change_hands_hold_what_a_fresh_gathering_finds() {
+        let mut body = wheel(40);
+        let all: Vec<u32> = (0..42).collect();
+        body.prepare_compliance(&all, 0);
+        let mut kept = NodeCompliance::default();
+        for step in 0..60_u32 {
+            // Between 4 and 42 nodes, some of them new in every step.
+            let period = 1 + step % 7;
+            let nodes: Vec<u32> = all
+                .iter()
+                .copied()
+                .filter(|node| (node + step / 3) % period < 1 + step / 20)
+                .collect();
+            kept.gather(&body.compliance, 42, &nodes);
+            let mut fresh = NodeCompliance::default();
+            fresh.gather(&body.compliance, 42, &nodes);
+            for &loaded in &nodes {
+                for &moved in &nodes {
+                    let entry =
+                        |from: &NodeCompliance| from.entry(from.slot(moved), from.slot(loaded));
+                    assert_eq!(entry(&kept), entry(&fresh), "step {step}: {moved} by {loaded}");
+                    let column = body.compliance.column(loaded).unwrap();
+                    let exact = column[body.compliance.place(moved) as usize];
+                    for (a, b) in entry(&fresh).into_iter().zip(exact) {
+                        assert!((a - b).abs() <= 1e-4 * exact[0].abs(), "{a} {b}");
+                    }
+                }
+            }
+            assert!(kept.stride() <= 2 * nodes.len().next_multiple_of(LANES));
+        }
+    }
 }
