@@ -41,6 +41,16 @@ pub enum MechanicsError {
         /// The valid range.
         expected: &'static str,
     },
+    /// A law that the time step does not compute.
+    #[error("body {body} '{name}' has law {law}: the time step computes linear bodies only")]
+    UnsupportedLaw {
+        /// Index of the body.
+        body: usize,
+        /// Its name.
+        name: String,
+        /// Its first such law.
+        law: palpate_model::Law,
+    },
     /// The stiffness matrix of a body could not be factored.
     #[error("body {body} '{name}': {source}")]
     Factor {

@@ -1,11 +1,10 @@
 //! The model: bodies placed in space, how the text joins them, and what acts on all of them.
 
+mod material;
 mod pose;
 mod validate;
 
-use std::fmt;
 use std::path::PathBuf;
-use std::str::FromStr;
 use std::sync::Arc;
 
 use glam::{DQuat, DVec3};
@@ -15,6 +14,7 @@ use serde::{Deserialize, Serialize};
 use crate::language::Document;
 use crate::mesh::Mesh;
 
+pub use material::{Law, Material};
 pub use pose::{Pose, PoseParts};
 pub use validate::BodyError;
 
@@ -87,6 +87,9 @@ pub struct Body {
     pub processor: Option<u32>,
     /// Material of the tissue.
     pub material: Material,
+    /// Regions of the mesh with a material of their own, by region number, ascending. The body's
+    /// `damping` and `mass_damping` count for all regions.
+    pub regions: Vec<(i32, Material)>,
     /// Sorted indices of nodes held fixed.
     pub fixed_nodes: Vec<u32>,
     /// Motion of a rigid body; `None` for a deformable one.
@@ -100,6 +103,20 @@ pub struct Body {
 }
 
 impl Body {
+    /// The material of a region of the mesh.
+    pub fn material_of(&self, region: i32) -> &Material {
+        let found = self.regions.binary_search_by_key(&region, |(number, _)| *number);
+        found.map_or(&self.material, |index| &self.regions[index].1)
+    }
+
+    /// The material of each tetrahedron.
+    pub fn materials(&self) -> impl Iterator<Item = &Material> {
+        let regions = self.mesh.regions();
+        (0..self.mesh.tetrahedra().len()).map(move |index| {
+            regions.get(index).map_or(&self.material, |&region| self.material_of(region))
+        })
+    }
+
     /// A deformable body with every setting at its default.
     pub fn new(name: impl Into<String>, mesh: Arc<Mesh>) -> Self {
         Self {
@@ -109,69 +126,12 @@ impl Body {
             placement: Pose::IDENTITY,
             processor: None,
             material: Material::default(),
+            regions: Vec::new(),
             fixed_nodes: Vec::new(),
             rigid: None,
             contact: ContactSettings::default(),
             appearance: Appearance::default(),
             initial_velocity: [0.0; 3],
-        }
-    }
-}
-
-/// Constitutive law of a material.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
-#[non_exhaustive]
-pub enum Law {
-    /// Linear elasticity in the body's own rotating frame.
-    #[default]
-    Linear,
-}
-
-impl fmt::Display for Law {
-    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        out.write_str(match self {
-            Self::Linear => "linear",
-        })
-    }
-}
-
-impl FromStr for Law {
-    type Err = BodyError;
-
-    fn from_str(name: &str) -> Result<Self, BodyError> {
-        match name {
-            "linear" => Ok(Self::Linear),
-            _ => Err(BodyError::UnknownLaw(name.to_owned())),
-        }
-    }
-}
-
-/// Material of a body. The defaults are a generic soft organ.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
-pub struct Material {
-    /// Constitutive law.
-    pub law: Law,
-    /// Young's modulus [Pa].
-    pub young: f64,
-    /// Poisson's ratio, -1 < nu < 0.5.
-    pub poisson: f64,
-    /// Mass density [kg/m³].
-    pub density: f64,
-    /// Rayleigh damping proportional to stiffness [s].
-    pub damping: f64,
-    /// Rayleigh damping proportional to mass [1/s].
-    pub mass_damping: f64,
-}
-
-impl Default for Material {
-    fn default() -> Self {
-        Self {
-            law: Law::Linear,
-            young: 5_000.0,
-            poisson: 0.45,
-            density: 1_000.0,
-            damping: 0.01,
-            mass_damping: 0.0,
         }
     }
 }

@@ -15,6 +15,6 @@ mod text;
 pub use diagnostic::{Diagnostic, ModelError, Span};
 pub use document::{
     AppearanceEntries, Block, Branch, ContactEntries, Document, Fixed, FixedRegion,
-    MaterialEntries, PathKey, Rotation, Settings, Transform, Tree, Unit,
+    MaterialEntries, PathKey, RegionEntries, Rotation, Settings, Transform, Tree, Unit,
 };
 pub use load::{CoreLoader, LoadError, MeshLoader, load_model};

@@ -9,6 +9,7 @@ mod surface;
 
 use std::collections::BTreeMap;
 
+use glam::DVec3;
 use palpate_geometry::{Aabb, Point};
 use serde::{Deserialize, Serialize, Serializer};
 
@@ -25,6 +26,9 @@ pub(crate) use error::{Place, counted};
 /// Marks "no tetrahedron" or "no triangle" in index arrays.
 pub const NONE: u32 = u32::MAX;
 
+/// Most fibre directions of a tetrahedron.
+pub const FIBRE_FAMILIES: usize = 2;
+
 /// What a file or a user gives: plain arrays, nothing checked.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
 pub struct MeshData {
@@ -39,6 +43,9 @@ pub struct MeshData {
     pub node_sets: BTreeMap<String, Vec<u32>>,
     /// Region number of each tetrahedron, shape (m,), or empty.
     pub regions: Vec<i32>,
+    /// Fibre directions of each tetrahedron, of any length: up to two families, each shape (m, 3) or
+    /// empty. A zero vector: no fibre there.
+    pub fibres: [Vec<Point>; FIBRE_FAMILIES],
 }
 
 /// A checked mesh: finite nodes, indices in range, every tetrahedron positively oriented, no element
@@ -131,16 +138,31 @@ impl Mesh {
     /// As [`Mesh::with_nodes`]: a map that is nearly singular flattens tetrahedra.
     pub fn mapped(&self, map: impl Fn(Point) -> Point, mirrored: bool) -> Result<Self, MeshError> {
         let nodes: Vec<Point> = self.data.nodes.iter().map(|&point| map(point)).collect();
+        let fibres = self.mapped_fibres(&map);
         if !mirrored {
-            return self.with_nodes(nodes);
+            let mut moved = self.with_nodes(nodes)?;
+            moved.data.fibres = fibres;
+            return Ok(moved);
         }
         let mut data = self.clone().into_data();
         data.nodes = nodes;
+        data.fibres = fibres;
         data.tetrahedra.iter_mut().for_each(|tetrahedron| tetrahedron.swap(2, 3));
         data.triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
         check::check_finite(&data.nodes)?;
         check::check_orientations(&data.nodes, &data.tetrahedra)?;
         Ok(Self::from_checked(data))
+    }
+
+    /// Fibres as lines in the material, of length 1.
+    fn mapped_fibres(&self, map: &impl Fn(Point) -> Point) -> [Vec<Point>; FIBRE_FAMILIES] {
+        let origin = DVec3::from_array(map([0.0; 3]));
+        let turned = |&fibre: &Point| {
+            let length = DVec3::from_array(fibre).length();
+            let image = DVec3::from_array(map(fibre.map(|x| x / length.max(f64::MIN_POSITIVE))));
+            (image - origin).normalize_or_zero().to_array()
+        };
+        [0, 1].map(|family| self.data.fibres[family].iter().map(turned).collect())
     }
 
     /// The arrays that make this mesh; the triangles of a tetrahedral mesh are left out.
@@ -200,6 +222,12 @@ impl Mesh {
     /// Region number of each tetrahedron, shape (m,), or empty.
     pub fn regions(&self) -> &[i32] {
         &self.data.regions
+    }
+
+    /// Fibre directions of each tetrahedron, of any length, zero where there is none: two families,
+    /// each shape (m, 3) or empty.
+    pub fn fibres(&self) -> &[Vec<Point>; FIBRE_FAMILIES] {
+        &self.data.fibres
     }
 
     /// Box around all nodes.

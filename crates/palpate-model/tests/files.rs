@@ -30,6 +30,12 @@ fn error_of(name: &str, text: impl AsRef<[u8]>) -> String {
 fn full_mesh() -> Mesh {
     let mut data = box_data([3, 2, 1], [0.3, 0.2, 0.1]);
     data.regions = (0..data.tetrahedra.len() as i32).map(|index| index % 5 - 2).collect();
+    let fibres = |turn: f64| {
+        let angles = (0..data.tetrahedra.len()).map(|index| turn + 0.1 * index as f64);
+        angles.map(|angle| [angle.cos(), 0.3 * angle.sin(), 1e-9]).collect()
+    };
+    data.fibres = [fibres(0.0), fibres(1.0)];
+    data.fibres[1][2] = [0.0; 3];
     data.node_sets.insert("hilum".into(), vec![0, 4, 7]);
     data.node_sets.insert("none".into(), Vec::new());
     Mesh::new(data).unwrap()
@@ -42,6 +48,10 @@ fn a_written_mesh_reads_back_the_same() {
     let mut bare = mesh.clone().into_data();
     bare.node_sets.clear();
     let bare = Mesh::new(bare).unwrap();
+    let mut second_only = bare.clone().into_data();
+    second_only.regions.clear();
+    second_only.fibres[0].clear();
+    let second_only = Mesh::new(second_only).unwrap();
     let shell = MeshData {
         nodes: mesh.nodes().to_vec(),
         triangles: mesh.triangles().to_vec(),
@@ -49,13 +59,13 @@ fn a_written_mesh_reads_back_the_same() {
     };
     let shell = Mesh::new(shell).unwrap();
     let path = folder.path().join("mesh.seg");
-    for mesh in [&mesh, &shell] {
+    for mesh in [&mesh, &second_only, &shell] {
         write_mesh(&path, mesh).unwrap();
         assert_eq!(read(&path), ReadMesh { mesh: mesh.clone(), notes: Vec::new() });
     }
     let path = folder.path().join("mesh.vtk");
     for encoding in [VtkEncoding::Binary, VtkEncoding::Ascii] {
-        for mesh in [&bare, &shell] {
+        for mesh in [&bare, &second_only, &shell] {
             write_vtk(&path, mesh, encoding).unwrap();
             assert_eq!(read(&path), ReadMesh { mesh: mesh.clone(), notes: Vec::new() });
         }
@@ -116,9 +126,9 @@ fn errors_of_seg_files_name_file_line_and_index() {
     out of range: kidney.seg:8: tetrahedron 0: node index 99 is out of range (the mesh has 4 nodes)
     negative index: kidney.seg:12: tetrahedron 1 of 2: expected a node index, found `-3`
     too few: kidney.seg:9: tetrahedron 1 of 2: expected a node index, found the end of the file
-    too many: kidney.seg:7: expected a section (nodes, tetrahedra, triangles, regions, set) or the end of the file, found `0`; `nodes` announces fewer values
+    too many: kidney.seg:7: expected a section (nodes, tetrahedra, triangles, regions, fibres, fibres_2, set) or the end of the file, found `0`; `nodes` announces fewer values
     short node: kidney.seg:5: node 1 of 2: expected a coordinate, found `tetrahedra`
-    unknown section: kidney.seg:9: expected a section (nodes, tetrahedra, triangles, regions, set) or the end of the file, found `edges`
+    unknown section: kidney.seg:9: expected a section (nodes, tetrahedra, triangles, regions, fibres, fibres_2, set) or the end of the file, found `edges`
     twice: kidney.seg:7: a second `nodes` section; a mesh has one
     inverted: kidney.seg:9: 1 tetrahedron is inverted (negative volume): 1; repair re-orients them
     nan: kidney.seg:4: node 1: position (1, 0, NaN) is not finite

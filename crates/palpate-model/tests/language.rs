@@ -5,7 +5,7 @@ use std::path::Path;
 use insta::assert_snapshot;
 use palpate_model::language::{
     AppearanceEntries, Block, Branch, ContactEntries, Fixed, FixedRegion, MaterialEntries, PathKey,
-    Rotation, Settings, Span, Transform, Tree, Unit,
+    RegionEntries, Rotation, Settings, Span, Transform, Tree, Unit,
 };
 use palpate_model::{Document, Law};
 use proptest::prelude::*;
@@ -187,6 +187,49 @@ fn errors_read_like_a_compilers() {
 }
 
 #[test]
+fn materials_of_regions_are_read_beside_that_of_the_body() {
+    let text = "\
+TREE{
+  NE aorta.seg
+  MT{ law hgo  young 9000  k1 2363.2  k2 0.84  kappa 0.1  fibre 0,0,1  fibre_2 0,1,1 }
+  MT region -2 { law mooney-rivlin  mooney 0.25 }
+  MT region 7 {  }
+}
+";
+    let document = parse(text);
+    assert_eq!(document.to_text(), text);
+    let Block::Tree(tree) = &document.root else { panic!("a TREE") };
+    let [first, second] = &tree.settings.regions[..] else { panic!("two regions") };
+    assert_eq!((first.region, first.entries.law), (-2, Some(Law::MooneyRivlin)));
+    assert_eq!(second.entries, MaterialEntries::default());
+    assert_eq!(
+        parse("TREE{ NE a.seg MT region 3 young 1 }").to_text(),
+        "\
+TREE{
+  NE a.seg
+  MT region 3 { young 1 }
+}
+"
+    );
+    let text = "\
+TREE{ NE a.seg MT region 1.5 { young 1 } MT region 2 { damping 1 } MT region 2 { kappa 0.4 }
+  MT{ fibre 0,0,0 mooney 2 k2 0 law hgoo } MT{ young 1 } MT region { young 1 } }
+";
+    assert_snapshot!(brief(text), @r"
+    1:26: region takes a whole number, found 1.5
+    1:56: damping is that of the whole body, not of a region (write MT{ damping ... })
+    1:68: a second MT of this region in this block; it may stand once
+    1:88: kappa must be from 0 to 1/3, found 0.4
+    2:13: the fibre 0,0,0 has no direction
+    2:26: mooney must be from 0 to 1, found 2
+    2:31: k2 must be greater than 0, found 0
+    2:37: law is one of linear, corotated, stvk, neo-hookean, mooney-rivlin, hgo, found `hgoo` (hgoo: did you mean hgo?)
+    2:44: a second MT in this block; it may stand once
+    2:61: region takes one number, found `{`
+    ");
+}
+
+#[test]
 fn several_errors_come_in_one_run_and_none_twice() {
     let text = "\
 unit furlong
@@ -224,7 +267,7 @@ BRANCH{
     8:30: poisson must be greater than -1 and less than 0.5, found 0.5
     8:40: young must be greater than 0, found -3
     8:43: density takes one number, found `zero`
-    8:60: law is linear, found `linaer` (linaer: did you mean linear?)
+    8:60: law is one of linear, corotated, stvk, neo-hookean, mooney-rivlin, hgo, found `linaer` (linaer: did you mean linear?)
     9:12: two words after NE (quote a name with blanks: NE "my file.vtk")
     9:36: opacity must be from 0 to 1, found 2
     9:38: color takes red, green, blue from 0 to 1
@@ -359,23 +402,52 @@ fn rotation() -> impl Strategy<Value = Rotation> {
     ]
 }
 
+fn material_entries() -> impl Strategy<Value = MaterialEntries> {
+    let some = || prop::option::of(positive());
+    let law = prop::sample::select(Law::NAMES.to_vec()).prop_map(|name| name.parse().unwrap());
+    let fibre = || prop::option::of(triple().prop_filter("zero", |fibre| *fibre != [0.0; 3]));
+    let common = (prop::option::of(law), some(), prop::option::of(-0.99..0.49), some());
+    let special = (
+        prop::option::of(0.0..=1.0),
+        some(),
+        some(),
+        prop::option::of(0.0..=1.0 / 3.0),
+        [fibre(), fibre()],
+    );
+    (common, special).prop_map(
+        |((law, young, poisson, density), (mooney, k1, k2, kappa, fibres))| MaterialEntries {
+            law,
+            young,
+            poisson,
+            density,
+            mooney,
+            k1,
+            k2,
+            kappa,
+            fibres,
+            ..MaterialEntries::default()
+        },
+    )
+}
+
 fn settings() -> impl Strategy<Value = Settings> {
     let scale = prop::array::uniform3(number().prop_filter("zero", |value| *value != 0.0));
     let transform = (triple(), rotation(), scale)
         .prop_map(|(translation, rotation, scale)| Transform { translation, rotation, scale });
     let some = || prop::option::of(positive());
     let material =
-        (
-            prop::option::of(Just(Law::Linear)),
-            some(),
-            prop::option::of(-0.99..0.49),
-            some(),
-            some(),
-            some(),
-        )
-            .prop_map(|(law, young, poisson, density, damping, mass_damping)| {
-                MaterialEntries { law, young, poisson, density, damping, mass_damping }
+        (material_entries(), some(), some()).prop_map(|(entries, damping, mass_damping)| {
+            MaterialEntries { damping, mass_damping, ..entries }
+        });
+    let regions =
+        prop::collection::btree_map(any::<i16>(), material_entries(), 0..3).prop_map(|regions| {
+            let blocks = regions.into_iter().map(|(region, entries)| RegionEntries {
+                region: region.into(),
+                entries,
+                span: Span::default(),
             });
+            blocks.collect::<Vec<_>>()
+        });
     let contact = (some(), some(), some(), any::<Option<bool>>()).prop_map(
         |(friction, distance, stiffness, self_contact)| ContactEntries {
             friction,
@@ -388,10 +460,11 @@ fn settings() -> impl Strategy<Value = Settings> {
     let appearance =
         (prop::option::of(prop::array::uniform3(fraction())), prop::option::of(fraction()))
             .prop_map(|(color, opacity)| AppearanceEntries { color, opacity });
-    (prop::option::of(transform), material, contact, appearance).prop_map(
-        |(transform, material, contact, appearance)| Settings {
+    (prop::option::of(transform), material, regions, contact, appearance).prop_map(
+        |(transform, material, regions, contact, appearance)| Settings {
             transform,
             material,
+            regions,
             contact,
             appearance,
         },
@@ -494,6 +567,10 @@ fn soup() -> impl Strategy<Value = String> {
         "linear",
         "young",
         "poisson",
+        "region",
+        "neo-hookean",
+        "fibre",
+        "kappa",
         "self",
         "on",
         "friction",

@@ -87,6 +87,8 @@ fn what_no_repair_can_mend_is_refused_by_both() {
         data.node_sets.insert("hilum".into(), vec![7, 2]);
     });
     add("regions", &|data| data.regions = vec![1, 2]);
+    add("fibres", &|data| data.fibres[1] = vec![[1.0; 3]; 3]);
+    add("odd fibre", &|data| data.fibres[0] = vec![[0.0, f64::INFINITY, 0.0]]);
     add("both kinds", &|data| data.triangles = vec![[0, 1, 2]]);
     let text: Vec<String> = cases
         .into_iter()
@@ -104,6 +106,8 @@ fn what_no_repair_can_mend_is_refused_by_both() {
     repeated node: tetrahedron 1: node 1 is named twice
     set out of range: set `hilum`: node index 7 is out of range (the mesh has 4 nodes)
     regions: 2 region numbers for 1 tetrahedra; give one for each, or none
+    fibres: 3 fibre directions for 1 tetrahedra; give one for each, or none
+    odd fibre: the fibre direction of tetrahedron 0 is not finite; 0,0,0 is for none
     both kinds: the mesh has both tetrahedra and triangles; leave the triangles out, the surface of the tetrahedra is found from them
     ");
 }
@@ -121,6 +125,7 @@ fn inverted_flat_and_repeated_tetrahedra_are_refused_and_repaired() {
     // The bottom face of the box holds nodes 0, 1 and 3 and the new one.
     data.tetrahedra.insert(0, [0, 1, 3, flat + 1]);
     data.regions.insert(0, -1);
+    data.fibres[0] = data.regions.iter().map(|&region| [f64::from(region), 1.0, 0.0]).collect();
     data.tetrahedra.push([
         data.tetrahedra[2][1],
         data.tetrahedra[2][0],
@@ -128,6 +133,7 @@ fn inverted_flat_and_repeated_tetrahedra_are_refused_and_repaired() {
         data.tetrahedra[2][2],
     ]);
     data.regions.push(-2);
+    data.fibres[0].push([0.0; 3]);
     data.node_sets.insert("some".into(), vec![flat + 1, flat, 2, 1, 1]);
 
     let (mesh, report) = Mesh::repaired(data).unwrap();
@@ -135,6 +141,8 @@ fn inverted_flat_and_repeated_tetrahedra_are_refused_and_repaired() {
     assert_eq!(mesh.nodes(), sound.nodes);
     assert_eq!(mesh.tetrahedra().len(), sound.tetrahedra.len());
     assert_eq!(mesh.regions(), (0..sound.tetrahedra.len() as i32).collect::<Vec<_>>());
+    let followed = |(fibre, &region): (&[f64; 3], &i32)| fibre[0] == f64::from(region);
+    assert!(mesh.fibres()[0].iter().zip(mesh.regions()).all(followed));
     assert_eq!(mesh.node_sets()["some"], [1, 2]);
     assert!((mesh.volume() - 1.0).abs() < 1e-15);
     let again = Mesh::repaired(mesh.clone().into_data()).unwrap();

@@ -274,8 +274,72 @@ fn bodies_from_arrays_make_a_model_without_a_text() {
     body.material = palpate_model::Material::default();
     body.fixed_nodes = vec![0, 27];
     assert_eq!(body.validate(), Err(BodyError::FixedNodeOutOfRange { node: 27, node_count: 27 }));
-    assert_snapshot!("plastic".parse::<Law>().unwrap_err(), @r#"law "plastic" is not known; it must be "linear""#);
-    assert_eq!(Law::Linear.to_string().parse(), Ok(Law::Linear));
+    assert_snapshot!("plastic".parse::<Law>().unwrap_err(), @r#"law "plastic" is not known; it must be one of linear, corotated, stvk, neo-hookean, mooney-rivlin, hgo"#);
+    for name in Law::NAMES {
+        assert_eq!(name.parse::<Law>().unwrap().to_string(), name);
+    }
+}
+
+/// The mesh of [`loader`] in two regions, 1 and 4, with fibres in the first of them only.
+fn two_regions() -> OneMesh {
+    let mut data = loader().mesh.into_data();
+    let half = data.tetrahedra.len() / 2;
+    data.regions =
+        (0..data.tetrahedra.len()).map(|index| if index < half { 1 } else { 4 }).collect();
+    let along = |&region: &i32| [if region == 1 { 2.0 } else { 0.0 }, 0.0, 0.0];
+    data.fibres[0] = data.regions.iter().map(along).collect();
+    OneMesh { mesh: Mesh::new(data).unwrap(), asked: RefCell::default() }
+}
+
+#[test]
+fn regions_have_materials_of_their_own() {
+    let text = "BRANCH{
+        MT{ young 1000 law neo-hookean }  MT region 1 { poisson 0.3 k1 5 }  MT region 9 { young 7 }
+        TREE{ ME{ rot axis 0,0,1 angle 90  scale 2,2,-1 } NE a.seg
+              MT{ density 900 } MT region 1 { law hgo fibre_2 3,0,1 } MT region 4 { k1 6 } } }";
+    let document = Document::parse(text, Path::new("a.bml")).unwrap();
+    let model = document.load(&two_regions()).unwrap();
+    let body = &model.bodies[0];
+    assert_eq!(body.validate(), Ok(()));
+    assert_eq!(body.regions.iter().map(|(region, _)| *region).collect::<Vec<_>>(), [1, 4]);
+    let (first, second) = (body.material_of(1), body.material_of(4));
+    assert_eq!((first.law, second.law), (Law::HolzapfelGasserOgden, Law::NeoHookean));
+    assert_eq!((first.young, first.poisson, first.density, first.k1), (1000.0, 0.3, 900.0, 5.0));
+    assert_eq!((second.poisson, second.k1), (0.45, 6.0));
+    assert_eq!(body.material_of(9), &body.material);
+    // Fibres turn and mirror with the mesh: those of the text and those of the mesh.
+    let turned = first.fibres[1].unwrap();
+    assert!(close(turned.map(|x| x * 37.0_f64.sqrt()), [0.0, 6.0, -1.0]), "{turned:?}");
+    assert!(close(body.mesh.fibres()[0][0], [0.0, 1.0, 0.0]));
+    assert_eq!(body.mesh.fibres()[0].last(), Some(&[0.0; 3]));
+    let counted = body.materials().filter(|material| material.law == Law::NeoHookean).count();
+    assert_eq!(counted, body.mesh.tetrahedra().len() / 2);
+}
+
+#[test]
+fn laws_that_do_not_fit_together_are_refused() {
+    let error = |material: &str| {
+        let text = format!("TREE{{ NE a.seg {material} }}");
+        let document = Document::parse(&text, Path::new("a.bml")).unwrap();
+        document.load(&two_regions()).unwrap_err().diagnostics[0].message.clone()
+    };
+    let cases = [
+        "MT region 2 { young 1 }",
+        "MT region 1 { law corotated }",
+        "MT{ law hgo }",
+        "MT{ law corotated } MT region 4 { law hgo }",
+    ];
+    assert_snapshot!(cases.map(error).join("\n"), @r"
+    regions: the mesh has no region 2; it has 1, 4
+    law linear holds for a whole body: give all of its regions law linear, or none (corotated is its like)
+    law hgo: tetrahedron 24 has no fibre direction; give the material one, or the mesh the cell data `fibres`
+    law hgo: tetrahedron 24 has no fibre direction; give the material one, or the mesh the cell data `fibres`
+    ");
+    let mut body = Body::new("a", Arc::new(two_regions().mesh));
+    body.regions = vec![(4, body.material), (4, body.material)];
+    assert_eq!(body.validate(), Err(BodyError::RegionOrder { region: 4 }));
+    body.regions = vec![(4, palpate_model::Material { kappa: 0.34, ..body.material })];
+    assert_snapshot!(body.validate().unwrap_err(), @"kappa must be from 0 to 1/3, found 0.34");
 }
 
 #[test]

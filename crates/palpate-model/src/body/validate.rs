@@ -1,6 +1,8 @@
 //! Whether a body that did not come from a model file keeps the rules of one.
 
-use super::Body;
+use std::iter;
+
+use super::{Body, Law, Material};
 
 /// What is wrong with a body's settings.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -33,8 +35,37 @@ pub enum BodyError {
         key: usize,
     },
     /// A constitutive law that does not exist.
-    #[error("law {0:?} is not known; it must be \"linear\"")]
+    #[error("law {0:?} is not known; it must be one of {names}", names = Law::NAMES.join(", "))]
     UnknownLaw(String),
+    /// Material of a region that the mesh does not have.
+    #[error("regions: the mesh has no region {region}; it has {}", numbers(.known))]
+    UnknownRegion {
+        /// The region.
+        region: i32,
+        /// The regions of the mesh.
+        known: Vec<i32>,
+    },
+    /// Regions that do not ascend.
+    #[error("regions: region {region} comes twice or out of order")]
+    RegionOrder {
+        /// The later region.
+        region: i32,
+    },
+    /// The linear law beside others in one body.
+    #[error(
+        "law linear holds for a whole body: give all of its regions law linear, or none (corotated \
+         is its like)"
+    )]
+    MixedLaws,
+    /// A tetrahedron of a law with fibres without a direction.
+    #[error(
+        "law hgo: tetrahedron {tetrahedron} has no fibre direction; give the material one, or the \
+         mesh the cell data `fibres`"
+    )]
+    NoFibre {
+        /// The first such tetrahedron.
+        tetrahedron: usize,
+    },
 }
 
 impl Body {
@@ -56,14 +87,25 @@ impl Body {
             |entry, value| check(entry, value, (0.0..=1.0).contains(&value), "from 0 to 1");
         let finite = |entry, value| check(entry, value, true, "finite");
 
-        let material = &self.material;
-        positive("young", material.young)?;
-        let poisson = material.poisson;
-        let valid = -1.0 < poisson && poisson < 0.5;
-        check("poisson", poisson, valid, "greater than -1 and less than 0.5")?;
-        positive("density", material.density)?;
-        not_negative("damping", material.damping)?;
-        not_negative("mass_damping", material.mass_damping)?;
+        for material in iter::once(&self.material).chain(self.regions.iter().map(|(_, m)| m)) {
+            positive("young", material.young)?;
+            let poisson = material.poisson;
+            let valid = -1.0 < poisson && poisson < 0.5;
+            check("poisson", poisson, valid, "greater than -1 and less than 0.5")?;
+            positive("density", material.density)?;
+            not_negative("damping", material.damping)?;
+            not_negative("mass_damping", material.mass_damping)?;
+            fraction("mooney", material.mooney)?;
+            not_negative("k1", material.k1)?;
+            positive("k2", material.k2)?;
+            let valid = (0.0..=1.0 / 3.0).contains(&material.kappa);
+            check("kappa", material.kappa, valid, "from 0 to 1/3")?;
+            for fibre in material.fibres.into_iter().flatten() {
+                let length = fibre.iter().fold(0.0, |largest: f64, x| largest.max(x.abs()));
+                check("length of a fibre", length, length > 0.0, "greater than 0")?;
+            }
+        }
+        self.validate_regions()?;
 
         not_negative("friction", self.contact.friction)?;
         self.contact.distance.map_or(Ok(()), |value| positive("distance", value))?;
@@ -94,5 +136,44 @@ impl Body {
             }
         }
         Ok(())
+    }
+
+    /// Whether the regions exist, and the laws of all tetrahedra fit together.
+    fn validate_regions(&self) -> Result<(), BodyError> {
+        let mut known = self.mesh.regions().to_vec();
+        known.sort_unstable();
+        known.dedup();
+        for (index, &(region, _)) in self.regions.iter().enumerate() {
+            if known.binary_search(&region).is_err() {
+                return Err(BodyError::UnknownRegion { region, known });
+            }
+            if index > 0 && self.regions[index - 1].0 >= region {
+                return Err(BodyError::RegionOrder { region });
+            }
+        }
+        let is_linear = |material: &Material| material.law == Law::Linear;
+        if self.materials().any(is_linear) && !self.materials().all(is_linear) {
+            return Err(BodyError::MixedLaws);
+        }
+        let fibres = &self.mesh.fibres()[0];
+        let without = |(tetrahedron, material): (usize, &Material)| {
+            material.law == Law::HolzapfelGasserOgden
+                && material.fibres[0].is_none()
+                && fibres.get(tetrahedron).is_none_or(|fibre| *fibre == [0.0; 3])
+        };
+        match self.materials().enumerate().position(without) {
+            Some(tetrahedron) => Err(BodyError::NoFibre { tetrahedron }),
+            None => Ok(()),
+        }
+    }
+}
+
+fn numbers(regions: &[i32]) -> String {
+    const SHOWN: usize = 10;
+    let names: Vec<String> = regions.iter().take(SHOWN).map(ToString::to_string).collect();
+    match regions.len() {
+        0 => "none".to_owned(),
+        count if count > SHOWN => format!("{}, ...", names.join(", ")),
+        _ => names.join(", "),
     }
 }

@@ -30,7 +30,8 @@ pub(super) fn read(
     }
 }
 
-const SECTIONS: [&str; 5] = ["nodes", "tetrahedra", "triangles", "regions", "set"];
+const SECTIONS: [&str; 7] =
+    ["nodes", "tetrahedra", "triangles", "regions", "fibres", "fibres_2", "set"];
 
 struct Parser<R> {
     tokens: Tokens<R>,
@@ -78,6 +79,8 @@ impl<R: Read> Parser<R> {
                     self.data.triangles = self.elements(section, ElementKind::Triangle)?;
                 }
                 "regions" => self.regions()?,
+                "fibres" => self.fibres(section, 0)?,
+                "fibres_2" => self.fibres(section, 1)?,
                 _ => self.set()?,
             }
         }
@@ -158,6 +161,25 @@ impl<R: Read> Parser<R> {
         Ok(())
     }
 
+    fn fibres(&mut self, section: &str, family: usize) -> Result<(), ReadError> {
+        let count = self.data.tetrahedra.len();
+        if count == 0 {
+            return syntax(format!(
+                "`{section}` has one direction for each tetrahedron: give `tetrahedra` first"
+            ));
+        }
+        self.data.fibres[family].reserve_exact(count);
+        for index in 0..count {
+            let whose = || format!("fibre of tetrahedron {index} of {count}");
+            let mut fibre = [0.0; 3];
+            for component in &mut fibre {
+                *component = self.number("a component", whose)?;
+            }
+            self.data.fibres[family].push(fibre);
+        }
+        Ok(())
+    }
+
     fn set(&mut self) -> Result<(), ReadError> {
         let Some(name) = self.tokens.next()?.map(str::to_owned) else {
             return syntax("`set`: expected a name, found the end of the file");
@@ -214,6 +236,15 @@ pub(super) fn write(out: &mut dyn Write, mesh: &Mesh) -> io::Result<()> {
     if !mesh.regions().is_empty() {
         writeln!(out, "regions")?;
         write_wrapped(out, mesh.regions())?;
+    }
+    for (name, fibres) in ["fibres", "fibres_2"].iter().zip(mesh.fibres()) {
+        if !fibres.is_empty() {
+            writeln!(out, "{name}")?;
+        }
+        for fibre in fibres {
+            let [x, y, z] = fibre.map(Shortest);
+            writeln!(out, "  {x} {y} {z}")?;
+        }
     }
     for (name, nodes) in mesh.node_sets() {
         writeln!(out, "set {name} {}", nodes.len())?;

@@ -32,6 +32,7 @@ pub(super) fn read(
         nodes: None,
         cells: Cells::default(),
         regions: None,
+        fibres: [None, None],
         notes: Vec::new(),
         sought,
         sought_line: None,
@@ -51,6 +52,8 @@ struct VtkFile<R> {
     cells: Cells,
     /// Region of every cell, whatever its type.
     regions: Option<Vec<i32>>,
+    /// Fibres of every cell, whatever its type.
+    fibres: [Option<Vec<[f64; 3]>>; 2],
     notes: Vec<String>,
     sought: Option<Place>,
     sought_line: Option<usize>,
@@ -203,7 +206,7 @@ impl<R: Read> VtkFile<R> {
 
     fn into_parsed(self) -> Result<Parsed, String> {
         let nodes = self.nodes.ok_or("the file has no POINTS section")?;
-        let selection = self.cells.select(nodes, self.regions, self.notes)?;
+        let selection = self.cells.select(nodes, self.regions, self.fibres, self.notes)?;
         let sought_line = match self.sought {
             Some(Place::Element(_, index)) if !self.values.binary => {
                 selection.lines.get(index).copied()

@@ -7,6 +7,7 @@ use palpate_geometry::Point;
 
 use super::diagnostic::{Source, Span};
 use crate::body::{Appearance, ContactSettings, Law, Material, Pose};
+use crate::mesh::FIBRE_FAMILIES;
 
 /// A model file, parsed. Comments are not kept. Documents compare by what they say, not by spelling.
 #[derive(Clone, Debug)]
@@ -121,6 +122,8 @@ pub struct Settings {
     pub transform: Option<Transform>,
     /// MT.
     pub material: MaterialEntries,
+    /// MT of single regions, each region once, in the order of the text.
+    pub regions: Vec<RegionEntries>,
     /// CN.
     pub contact: ContactEntries,
     /// VE.
@@ -205,6 +208,42 @@ pub struct MaterialEntries {
     pub damping: Option<f64>,
     /// `mass_damping` [1/s].
     pub mass_damping: Option<f64>,
+    /// `mooney`.
+    pub mooney: Option<f64>,
+    /// `k1` [Pa].
+    pub k1: Option<f64>,
+    /// `k2`.
+    pub k2: Option<f64>,
+    /// `kappa`.
+    pub kappa: Option<f64>,
+    /// `fibre` and `fibre_2`, in the coordinates of the mesh file, of any length but zero.
+    pub fibres: [Option<Point>; FIBRE_FAMILIES],
+}
+
+/// An MT block of one region of the mesh.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct RegionEntries {
+    /// Number of the region.
+    pub region: i32,
+    /// What it says. `damping` and `mass_damping` are the body's.
+    pub entries: MaterialEntries,
+    /// Where MT stands.
+    pub span: Span,
+}
+
+impl RegionEntries {
+    /// The blocks of both, those of `inner` entry by entry over those of the same region of `outer`.
+    pub(super) fn merged(inner: &[Self], outer: &[Self]) -> Vec<Self> {
+        let mut merged = outer.to_vec();
+        for block in inner {
+            match merged.iter_mut().find(|other| other.region == block.region) {
+                Some(other) => other.entries = block.entries.over(&other.entries),
+                None => merged.push(*block),
+            }
+        }
+        merged.sort_by_key(|block| block.region);
+        merged
+    }
 }
 
 impl MaterialEntries {
@@ -217,10 +256,16 @@ impl MaterialEntries {
             density: self.density.or(outer.density),
             damping: self.damping.or(outer.damping),
             mass_damping: self.mass_damping.or(outer.mass_damping),
+            mooney: self.mooney.or(outer.mooney),
+            k1: self.k1.or(outer.k1),
+            k2: self.k2.or(outer.k2),
+            kappa: self.kappa.or(outer.kappa),
+            fibres: [0, 1].map(|family| self.fibres[family].or(outer.fibres[family])),
         }
     }
 
-    pub(super) fn material(&self) -> Material {
+    /// The material; `placement` turns the fibres with the mesh.
+    pub(super) fn material(&self, placement: &Pose) -> Material {
         let default = Material::default();
         Material {
             law: self.law.unwrap_or(default.law),
@@ -229,8 +274,21 @@ impl MaterialEntries {
             density: self.density.unwrap_or(default.density),
             damping: self.damping.unwrap_or(default.damping),
             mass_damping: self.mass_damping.unwrap_or(default.mass_damping),
+            mooney: self.mooney.unwrap_or(default.mooney),
+            k1: self.k1.unwrap_or(default.k1),
+            k2: self.k2.unwrap_or(default.k2),
+            kappa: self.kappa.unwrap_or(default.kappa),
+            fibres: self.fibres.map(|fibre| fibre.map(|fibre| turned(fibre, placement))),
         }
     }
+}
+
+/// A line of the mesh in its place, of length 1.
+fn turned(fibre: Point, placement: &Pose) -> Point {
+    // The largest component goes first: tiny and huge directions are directions too.
+    let fibre = DVec3::from_array(fibre);
+    let image = placement.linear * (fibre / fibre.abs().max_element()).normalize();
+    (image / image.abs().max_element()).normalize().to_array()
 }
 
 /// A CN block: what it says and what it leaves open.

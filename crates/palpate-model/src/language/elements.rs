@@ -2,13 +2,28 @@
 
 use super::diagnostic::Span;
 use super::document::{
-    AppearanceEntries, ContactEntries, Fixed, FixedRegion, MaterialEntries, PathKey, Rotation,
-    Transform,
+    AppearanceEntries, ContactEntries, Fixed, FixedRegion, MaterialEntries, PathKey, RegionEntries,
+    Rotation, Transform,
 };
 use super::lexer::Token;
 use super::near::near_miss;
 use super::parser::{Parser, is_entry, is_keyword};
 use crate::body::Law;
+
+const MATERIAL_ENTRIES: [&str; 12] = [
+    "law",
+    "young",
+    "poisson",
+    "density",
+    "damping",
+    "mass_damping",
+    "mooney",
+    "k1",
+    "k2",
+    "kappa",
+    "fibre",
+    "fibre_2",
+];
 
 const NONE_AGAIN: &[&str] = &[];
 
@@ -300,10 +315,44 @@ impl Parser<'_> {
     }
 
     pub(super) fn material(&mut self, span: Span) -> MaterialEntries {
+        self.material_entries(span, false)
+    }
+
+    /// The number after `region`, which is next, and the entries.
+    pub(super) fn region_material(&mut self, span: Span, regions: &mut Vec<RegionEntries>) {
+        let word = self.advance();
+        let here = self.peek().1;
+        let number = self.numbers::<1>("region", word).map(|[number]| number);
+        let whole = |number: &f64| number.fract() == 0.0 && number.abs() <= f64::from(i32::MAX);
+        let region = number.filter(whole).map(|number| number as i32);
+        if let (Some(number), None) = (number, region) {
+            self.error(here, format!("region takes a whole number, found {number}"));
+        }
+        if region.is_some() && regions.iter().any(|block| Some(block.region) == region) {
+            self.error(
+                span.to(here),
+                "a second MT of this region in this block; it may stand once",
+            );
+        }
+        let entries = self.material_entries(span, true);
+        if let Some(region) = region {
+            regions.push(RegionEntries { region, entries, span: span.to(here) });
+        }
+    }
+
+    fn material_entries(&mut self, span: Span, of_region: bool) -> MaterialEntries {
         let mut material = MaterialEntries::default();
-        let allowed = ["law", "young", "poisson", "density", "damping", "mass_damping"];
+        let allowed = MATERIAL_ENTRIES;
         self.entries("MT", span, &allowed, NONE_AGAIN, |parser, keyword, span| match keyword {
-            "law" => material.law = parser.choice("law", &["linear"]).map(|_| Law::Linear),
+            "damping" | "mass_damping" if of_region => {
+                let message = format!("{keyword} is that of the whole body, not of a region");
+                parser.error_with_hint(span, message, format!("write MT{{ {keyword} ... }}"));
+                parser.not_negative(keyword, span);
+            }
+            "law" => {
+                let name = parser.choice("law", &Law::NAMES);
+                material.law = name.and_then(|name| name.parse().ok());
+            }
             "young" => material.young = parser.positive("young", span),
             "poisson" => {
                 let valid = |value| -1.0 < value && value < 0.5;
@@ -312,9 +361,30 @@ impl Parser<'_> {
             }
             "density" => material.density = parser.positive("density", span),
             "damping" => material.damping = parser.not_negative("damping", span),
-            _ => material.mass_damping = parser.not_negative("mass_damping", span),
+            "mass_damping" => material.mass_damping = parser.not_negative("mass_damping", span),
+            "mooney" => {
+                let valid = |value| (0.0..=1.0).contains(&value);
+                material.mooney = parser.checked("mooney", span, valid, "from 0 to 1");
+            }
+            "k1" => material.k1 = parser.not_negative("k1", span),
+            "k2" => material.k2 = parser.positive("k2", span),
+            "kappa" => {
+                let valid = |value| (0.0..=1.0 / 3.0).contains(&value);
+                material.kappa = parser.checked("kappa", span, valid, "from 0 to 1/3");
+            }
+            _ => material.fibres[usize::from(keyword == "fibre_2")] = parser.fibre(keyword, span),
         });
         material
+    }
+
+    fn fibre(&mut self, keyword: &str, span: Span) -> Option<[f64; 3]> {
+        let here = self.peek().1;
+        let fibre = self.numbers::<3>(keyword, span)?;
+        if fibre == [0.0; 3] {
+            self.error(here, format!("the {keyword} 0,0,0 has no direction"));
+            return None;
+        }
+        Some(fibre)
     }
 
     pub(super) fn contact(&mut self, span: Span) -> ContactEntries {
@@ -358,7 +428,11 @@ impl Parser<'_> {
             self.advance();
             return choice;
         }
-        let message = format!("{keyword} is {}, found {found}", allowed.join(" or "));
+        let choices = match allowed {
+            [first, second] => format!("{first} or {second}"),
+            _ => format!("one of {}", allowed.join(", ")),
+        };
+        let message = format!("{keyword} is {choices}, found {found}");
         match near_miss(&word, allowed) {
             Some(meant) => {
                 self.error_with_hint(span, message, format!("{word}: did you mean {meant}?"));

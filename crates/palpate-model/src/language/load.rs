@@ -10,10 +10,10 @@ use glam::{DMat3, DVec3};
 use super::diagnostic::{Diagnostic, ModelError, Span};
 use super::document::{
     AppearanceEntries, Block, ContactEntries, Document, Fixed, FixedRegion, MaterialEntries,
-    PathKey, Settings, Tree,
+    PathKey, RegionEntries, Settings, Tree,
 };
 use super::near::near_miss;
-use crate::body::{Body, Model, Pose, RigidKey, RigidMotion, Structure};
+use crate::body::{Body, BodyError, Material, Model, Pose, RigidKey, RigidMotion, Structure};
 use crate::files::{FileError, ReadMesh, ReadOptions, read_mesh};
 use crate::mesh::{Mesh, MeshError};
 use crate::number::Triple;
@@ -123,10 +123,11 @@ fn collect_names(block: &Block, names: &mut HashSet<String>) {
 }
 
 /// What the blocks around a block say.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 struct Inherited {
     pose: Pose,
     material: MaterialEntries,
+    regions: Vec<RegionEntries>,
     contact: ContactEntries,
     appearance: AppearanceEntries,
 }
@@ -136,6 +137,7 @@ impl Default for Inherited {
         Self {
             pose: Pose::IDENTITY,
             material: MaterialEntries::default(),
+            regions: Vec::new(),
             contact: ContactEntries::default(),
             appearance: AppearanceEntries::default(),
         }
@@ -147,6 +149,7 @@ impl Inherited {
         Self {
             pose: settings.transform.map_or(self.pose, |inner| self.pose.after(&inner.pose())),
             material: settings.material.over(&self.material),
+            regions: RegionEntries::merged(&settings.regions, &self.regions),
             contact: settings.contact.over(&self.contact),
             appearance: settings.appearance.over(&self.appearance),
         }
@@ -203,19 +206,54 @@ impl Build<'_> {
             pivot: placement.translation.to_array(),
         });
         let velocity = tree.initial_velocity.unwrap_or_default();
-        Some(Body {
+        let regions = self.regions(&mesh, tree, inherited, &placement)?;
+        let body = Body {
             name,
             mesh: placed,
             source: path,
             placement,
             processor: tree.processor,
-            material: inherited.material.material(),
+            material: inherited.material.material(&placement),
+            regions,
             fixed_nodes: fixed_nodes?,
             rigid,
             contact: inherited.contact.settings(unit),
             appearance: inherited.appearance.appearance(),
             initial_velocity: velocity.map(|component| component * unit.metres()),
-        })
+        };
+        // Values were checked where they stand; this is about how they fit together.
+        if let Err(error) = body.validate() {
+            self.error(tree.span, error.to_string(), None);
+            return None;
+        }
+        Some(body)
+    }
+
+    /// Materials of the regions that the mesh has; `None` when the TREE names another one.
+    fn regions(
+        &mut self,
+        mesh: &Mesh,
+        tree: &Tree,
+        inherited: &Inherited,
+        placement: &Pose,
+    ) -> Option<Vec<(i32, Material)>> {
+        let mut known = mesh.regions().to_vec();
+        known.sort_unstable();
+        known.dedup();
+        let errors_before = self.errors.len();
+        for block in &tree.settings.regions {
+            if known.binary_search(&block.region).is_err() {
+                let message =
+                    BodyError::UnknownRegion { region: block.region, known: known.clone() };
+                self.error(block.span, message.to_string(), None);
+            }
+        }
+        let present = inherited.regions.iter().filter(|block| known.contains(&block.region));
+        let regions = present.map(|block| {
+            let entries = block.entries.over(&inherited.material);
+            (block.region, entries.material(placement))
+        });
+        (self.errors.len() == errors_before).then(|| regions.collect())
     }
 
     /// The file's stem, with _2, _3 where another body has that name.

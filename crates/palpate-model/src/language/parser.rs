@@ -15,7 +15,7 @@ const IN_BRANCH: [&str; 6] = ["ME", "MT", "CN", "VE", "BRANCH", "TREE"];
 const IN_TREE: [&str; 9] = ["ME", "PE", "NE", "MT", "FX", "RG", "CN", "VE", "IV"];
 
 /// Entries, and the element that each stands in.
-const ENTRIES: [(&str, &str); 19] = [
+const ENTRIES: [(&str, &str); 26] = [
     ("trans", "ME"),
     ("rot", "ME"),
     ("scale", "ME"),
@@ -25,6 +25,13 @@ const ENTRIES: [(&str, &str); 19] = [
     ("density", "MT"),
     ("damping", "MT"),
     ("mass_damping", "MT"),
+    ("mooney", "MT"),
+    ("k1", "MT"),
+    ("k2", "MT"),
+    ("kappa", "MT"),
+    ("fibre", "MT"),
+    ("fibre_2", "MT"),
+    ("region", "MT"),
     ("friction", "CN"),
     ("distance", "CN"),
     ("stiffness", "CN"),
@@ -278,7 +285,9 @@ impl Parser<'_> {
                     branch.children.push(child);
                 }
                 Item::Element(keyword, span) => {
-                    self.once(keyword, span, &mut seen);
+                    if !self.is_region(keyword) {
+                        self.once(keyword, span, &mut seen);
+                    }
                     self.setting(keyword, span, &mut branch.settings);
                 }
                 Item::Close if branch.children.is_empty() && self.drop_surplus() => {}
@@ -317,7 +326,7 @@ impl Parser<'_> {
             }
             match self.next_item(&IN_TREE, Some("TREE")) {
                 Item::Element(keyword, span) => {
-                    if keyword != "FX" {
+                    if keyword != "FX" && !self.is_region(keyword) {
                         self.once(keyword, span, &mut seen);
                     }
                     self.tree_element(keyword, span, &mut tree);
@@ -374,10 +383,16 @@ impl Parser<'_> {
     fn setting(&mut self, keyword: &'static str, span: Span, settings: &mut Settings) {
         match keyword {
             "ME" => settings.transform = Some(self.transform(span)),
+            "MT" if self.is_region(keyword) => self.region_material(span, &mut settings.regions),
             "MT" => settings.material = self.material(span),
             "CN" => settings.contact = self.contact(span),
             _ => settings.appearance = self.appearance(span),
         }
+    }
+
+    /// Whether the element is an MT of one region; those may come more than once.
+    fn is_region(&self, keyword: &str) -> bool {
+        keyword == "MT" && self.peek_word() == Some("region")
     }
 
     /// A TREE cannot hold blocks. True when its closing bracket is what is missing.

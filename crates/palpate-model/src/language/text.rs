@@ -2,13 +2,14 @@
 
 use std::fmt::{self, Display, Write};
 
+use palpate_geometry::Point;
+
 use super::document::{
-    Block, Document, FixedRegion, MaterialEntries, PathKey, Rotation, Settings, Transform, Tree,
-    Unit,
+    Block, Document, FixedRegion, MaterialEntries, PathKey, RegionEntries, Rotation, Settings,
+    Transform, Tree, Unit,
 };
 use super::lexer::is_one_word;
 use super::parser::is_keyword;
-use crate::body::Law;
 use crate::number::{Shortest, Triple};
 
 impl Document {
@@ -98,23 +99,14 @@ fn write_transform(text: &mut String, settings: &Settings, depth: usize) {
 fn write_settings(text: &mut String, settings: &Settings, depth: usize) {
     let number =
         |name, value: Option<f64>| value.map(|value| format!("{name} {}", Shortest(value)));
-    let MaterialEntries { law, young, poisson, density, damping, mass_damping } = settings.material;
-    let law = law.map(|Law::Linear| "law linear".to_owned());
     let contact = settings.contact;
     let switch = |on: bool| format!("self {}", if on { "on" } else { "off" });
     let appearance = settings.appearance;
-    let blocks: [(&str, Vec<Option<String>>); 3] = [
-        (
-            "MT",
-            vec![
-                law,
-                number("young", young),
-                number("poisson", poisson),
-                number("density", density),
-                number("damping", damping),
-                number("mass_damping", mass_damping),
-            ],
-        ),
+    write_material(text, None, &settings.material, depth);
+    for RegionEntries { region, entries, .. } in &settings.regions {
+        write_material(text, Some(*region), entries, depth);
+    }
+    let blocks: [(&str, Vec<Option<String>>); 2] = [
         (
             "CN",
             vec![
@@ -137,6 +129,41 @@ fn write_settings(text: &mut String, settings: &Settings, depth: usize) {
         if !entries.is_empty() {
             line(text, depth, format_args!("{name}{{ {} }}", entries.join("  ")));
         }
+    }
+}
+
+fn write_material(
+    text: &mut String,
+    region: Option<i32>,
+    material: &MaterialEntries,
+    depth: usize,
+) {
+    let number =
+        |name, value: Option<f64>| value.map(|value| format!("{name} {}", Shortest(value)));
+    let MaterialEntries { law, young, poisson, density, damping, mass_damping, .. } = *material;
+    let MaterialEntries { mooney, k1, k2, kappa, fibres, .. } = *material;
+    let fibre = |name, fibre: Option<Point>| fibre.map(|d| format!("{name} {}", Triple(d)));
+    let entries = [
+        law.map(|law| format!("law {law}")),
+        number("young", young),
+        number("poisson", poisson),
+        number("density", density),
+        number("damping", damping),
+        number("mass_damping", mass_damping),
+        number("mooney", mooney),
+        number("k1", k1),
+        number("k2", k2),
+        number("kappa", kappa),
+        fibre("fibre", fibres[0]),
+        fibre("fibre_2", fibres[1]),
+    ];
+    let entries: Vec<String> = entries.into_iter().flatten().collect();
+    match region {
+        Some(region) => {
+            line(text, depth, format_args!("MT region {region} {{ {} }}", entries.join("  ")));
+        }
+        None if entries.is_empty() => {}
+        None => line(text, depth, format_args!("MT{{ {} }}", entries.join("  "))),
     }
 }
 

@@ -81,6 +81,17 @@ pub(super) fn check_arrays(data: &mut MeshData) -> Result<(), MeshError> {
             tetrahedra: data.tetrahedra.len(),
         });
     }
+    for fibres in data.fibres.iter().filter(|fibres| !fibres.is_empty()) {
+        if fibres.len() != data.tetrahedra.len() {
+            let (fibres, tetrahedra) = (fibres.len(), data.tetrahedra.len());
+            return Err(MeshError::FibreCount { fibres, tetrahedra });
+        }
+        let odd = fibres.iter().position(|fibre| fibre.iter().any(|x| !x.is_finite()));
+        if let Some(tetrahedron) = odd {
+            let tetrahedron = tetrahedron as u32;
+            return Err(MeshError::NonFiniteFibre { tetrahedron });
+        }
+    }
     for (set, nodes) in &mut data.node_sets {
         nodes.sort_unstable();
         nodes.dedup();
@@ -218,6 +229,9 @@ pub(super) fn repair(data: &mut MeshData) -> Result<RepairReport, MeshError> {
     retain(&mut data.tetrahedra, &keep);
     if !data.regions.is_empty() {
         retain(&mut data.regions, &keep);
+    }
+    for fibres in data.fibres.iter_mut().filter(|fibres| !fibres.is_empty()) {
+        retain(fibres, &keep);
     }
     if element_count > 0 && data.tetrahedra.is_empty() {
         return Err(MeshError::NothingLeft { dropped: element_count });

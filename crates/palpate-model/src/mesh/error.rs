@@ -150,6 +150,20 @@ pub enum MeshError {
         /// How many tetrahedra there are.
         tetrahedra: usize,
     },
+    /// A family of `fibres` is neither empty nor one direction per tetrahedron.
+    #[error("{fibres} fibre directions for {tetrahedra} tetrahedra; give one for each, or none")]
+    FibreCount {
+        /// How many directions came.
+        fibres: usize,
+        /// How many tetrahedra there are.
+        tetrahedra: usize,
+    },
+    /// A fibre direction that is infinite or not a number.
+    #[error("the fibre direction of tetrahedron {tetrahedron} is not finite; 0,0,0 is for none")]
+    NonFiniteFibre {
+        /// The first such tetrahedron.
+        tetrahedron: u32,
+    },
     /// Tetrahedra with negative volume.
     #[error(
         "{} inverted (negative volume): {}; repair re-orients them",

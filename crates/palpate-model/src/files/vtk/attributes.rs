@@ -1,4 +1,5 @@
-//! Data at points and cells of a legacy `.vtk` file: region numbers are kept, the rest is skipped.
+//! Data at points and cells of a legacy `.vtk` file: region numbers and fibre directions are kept, the
+//! rest is skipped.
 
 use std::io::Read;
 
@@ -8,6 +9,9 @@ use super::scalar::Scalar;
 
 /// Cell data of these names are region numbers.
 const REGION_NAMES: [&str; 3] = ["region", "regions", "material"];
+
+/// Cell data of these names are the fibre directions of the two families.
+const FIBRE_NAMES: [&[&str]; 2] = [&["fibres", "fibers"], &["fibres_2", "fibers_2"]];
 
 /// What attributes belong to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -46,7 +50,13 @@ impl<R: Read> VtkFile<R> {
                 let width = self.values.count("TEXTURE_COORDINATES")?;
                 return self.skip_typed(width.saturating_mul(count));
             }
-            "VECTORS" | "NORMALS" => 3,
+            "VECTORS" => {
+                let name = self.values.word("a name")?;
+                let scalar = self.values.scalar_type()?;
+                self.values.begin_data()?;
+                return self.array(&name, owner, 3, count, scalar);
+            }
+            "NORMALS" => 3,
             "TENSORS" => 9,
             "TENSORS6" => 6,
             "GLOBAL_IDS" | "PEDIGREE_IDS" | "EDGE_FLAGS" => 1,
@@ -121,6 +131,14 @@ impl<R: Read> VtkFile<R> {
         count: usize,
         scalar: Scalar,
     ) -> Result<(), ReadError> {
+        let named = |names: &&[&str]| names.iter().any(|fibre| name.eq_ignore_ascii_case(fibre));
+        let family = FIBRE_NAMES.iter().position(named);
+        if let (Owner::Cells(_), 3, Some(family)) = (owner, width, family)
+            && self.fibres[family].is_none()
+            && !matches!(scalar, Scalar::Text | Scalar::Bit)
+        {
+            return self.fibres(name, family, count, scalar);
+        }
         let is_region = matches!(owner, Owner::Cells(_))
             && width == 1
             && REGION_NAMES.iter().any(|region| name.eq_ignore_ascii_case(region));
@@ -148,6 +166,23 @@ impl<R: Read> VtkFile<R> {
             }
             None => self.regions = Some(regions),
         }
+        Ok(())
+    }
+
+    fn fibres(
+        &mut self,
+        name: &str,
+        family: usize,
+        count: usize,
+        scalar: Scalar,
+    ) -> Result<(), ReadError> {
+        let mut fibres = Vec::with_capacity(self.values.plausible(count, 3, scalar));
+        for index in 0..count {
+            let whose = || format!("{name} of cell {index}");
+            let x = self.values.float(scalar, whose)?;
+            fibres.push([x, self.values.float(scalar, whose)?, self.values.float(scalar, whose)?]);
+        }
+        self.fibres[family] = Some(fibres);
         Ok(())
     }
 }

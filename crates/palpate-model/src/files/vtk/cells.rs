@@ -207,6 +207,7 @@ impl Cells {
         self,
         nodes: Vec<[f64; 3]>,
         regions: Option<Vec<i32>>,
+        fibres: [Option<Vec<[f64; 3]>>; 2],
         mut notes: Vec<String>,
     ) -> Result<Selection, String> {
         if self.types.len() != self.len() {
@@ -260,6 +261,12 @@ impl Cells {
         let regions = regions.filter(|regions| has_tetrahedra && regions.len() == self.len());
         if let Some(regions) = regions {
             data.regions = taken.iter().map(|&cell| regions[cell as usize]).collect();
+        }
+        for (of_cells, kept) in fibres.into_iter().zip(&mut data.fibres) {
+            let fibres = of_cells.filter(|fibres| has_tetrahedra && fibres.len() == self.len());
+            if let Some(fibres) = fibres {
+                *kept = taken.iter().map(|&cell| fibres[cell as usize]).collect();
+            }
         }
         if quadratic > 0 {
             notes.push(format!("quadratic tetrahedra read by their four corners: {quadratic}"));

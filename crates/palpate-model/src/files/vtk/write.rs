@@ -18,7 +18,8 @@ pub enum VtkEncoding {
 }
 
 /// Writes an unstructured grid of tetrahedra, or of triangles for a surface-only mesh; regions
-/// become the cell data `region`. Node sets have no place in the format.
+/// become the cell data `region`, fibres `fibres` and `fibres_2`. Node sets have no place in the
+/// format.
 ///
 /// # Errors
 /// If the file cannot be written.
@@ -33,30 +34,42 @@ fn write(out: &mut dyn Write, mesh: &Mesh, encoding: VtkEncoding) -> io::Result<
     };
     writeln!(out, "# vtk DataFile Version 4.2\nmesh\n{name}\nDATASET UNSTRUCTURED_GRID")?;
     writeln!(out, "POINTS {} double", mesh.nodes().len())?;
-    for node in mesh.nodes() {
-        match encoding {
-            VtkEncoding::Binary => node.iter().try_for_each(|x| out.write_all(&x.to_be_bytes()))?,
-            VtkEncoding::Ascii => {
-                let [x, y, z] = node.map(Shortest);
-                writeln!(out, "{x} {y} {z}")?;
-            }
-        }
-    }
-    if encoding == VtkEncoding::Binary {
-        writeln!(out)?;
-    }
+    points(out, mesh.nodes(), encoding)?;
     if mesh.is_surface_only() {
         cells(out, mesh.triangles(), 5, encoding)?;
     } else {
         cells(out, mesh.tetrahedra(), 10, encoding)?;
     }
+    if !mesh.regions().is_empty() || mesh.fibres().iter().any(|fibres| !fibres.is_empty()) {
+        writeln!(out, "CELL_DATA {}", mesh.tetrahedra().len())?;
+    }
     if !mesh.regions().is_empty() {
-        writeln!(out, "CELL_DATA {}", mesh.regions().len())?;
         writeln!(out, "SCALARS region int 1\nLOOKUP_TABLE default")?;
         mesh.regions().iter().try_for_each(|&region| row(out, &[region], encoding))?;
         end_section(out, encoding)?;
     }
+    for (name, fibres) in ["fibres", "fibres_2"].iter().zip(mesh.fibres()) {
+        if !fibres.is_empty() {
+            writeln!(out, "VECTORS {name} double")?;
+            points(out, fibres, encoding)?;
+        }
+    }
     Ok(())
+}
+
+fn points(out: &mut dyn Write, points: &[[f64; 3]], encoding: VtkEncoding) -> io::Result<()> {
+    for point in points {
+        match encoding {
+            VtkEncoding::Binary => {
+                point.iter().try_for_each(|x| out.write_all(&x.to_be_bytes()))?;
+            }
+            VtkEncoding::Ascii => {
+                let [x, y, z] = point.map(Shortest);
+                writeln!(out, "{x} {y} {z}")?;
+            }
+        }
+    }
+    end_section(out, encoding)
 }
 
 fn cells<const N: usize>(
