@@ -51,6 +51,17 @@ pub enum MechanicsError {
         /// Its first such law.
         law: palpate_model::Law,
     },
+    /// Regions of different elasticity or density, which the time step does not compute.
+    #[error(
+        "body {body} '{name}' has regions of different young, poisson or density: the time step \
+         computes one for the body"
+    )]
+    UnsupportedRegions {
+        /// Index of the body.
+        body: usize,
+        /// Its name.
+        name: String,
+    },
     /// The stiffness matrix of a body could not be factored.
     #[error("body {body} '{name}': {source}")]
     Factor {

@@ -9,6 +9,8 @@ mod contact;
 mod dynamics;
 mod energy;
 mod error;
+#[cfg_attr(not(test), expect(dead_code, reason = "the time step does not call the laws yet"))]
+mod materials;
 mod state;
 #[cfg_attr(not(test), expect(dead_code, reason = "the time step does not call the laws yet"))]
 mod tissue;

@@ -7,6 +7,7 @@ use palpate_solver::{BlockMatrix, BlockPattern, FactorError};
 
 use super::FIXED;
 use crate::error::MechanicsError;
+use crate::materials::check_supported;
 
 /// A over the free nodes.
 pub(super) fn system_matrix(
@@ -57,6 +58,7 @@ pub(super) fn in_body_numbering(error: FactorError, free_nodes: &[u32]) -> Facto
 }
 
 pub(super) fn check_material(index: usize, body: &Body) -> Result<(), MechanicsError> {
+    check_supported(index, body)?;
     let m = &body.material;
     let finite = |value: f64, ok: bool| value.is_finite() && ok;
     let checks = [
