@@ -158,3 +158,39 @@ def test_bad_bodies_are_refused_by_name(cube, body, text):
 
 def test_cube_in_fixture_is_what_the_tests_say(cube):
     assert np.array_equal(cube.tetrahedra, CUBE_TETRAHEDRA)
+
+
+def test_materials_of_regions_and_fibres(tmp_path, cube):
+    count = len(cube.tetrahedra)
+    along, across = np.tile([0.0, 0.0, 2.0], (count, 1)), np.tile([1.0, 0.0, 0.0], (count, 1))
+    mesh = palpate.Mesh(
+        cube.nodes,
+        cube.tetrahedra,
+        regions=np.arange(count) % 2,
+        fibres=np.stack([along, across], axis=1),
+    )
+    assert np.array_equal(mesh.fibres[:, 1], across)
+    assert cube.fibres is None
+    for name in ("artery.seg", "artery.vtk", "artery.vtu"):
+        palpate.write_mesh(tmp_path / name, mesh)
+        assert palpate.read_mesh(tmp_path / name) == mesh
+    wall = palpate.Material(law="hgo", k1=3000.0, fibre_2=(0.0, 1.0, 0.0))
+    body = palpate.Body(
+        mesh, name="artery", material=palpate.Material(law="neo-hookean"), regions={1: wall}
+    )
+    model = palpate.Model([body])
+    assert model.bodies[0].regions == {1: wall}
+    with pytest.raises(palpate.SimulationError, match="'artery' has law neo-hookean"):
+        palpate.Simulation(model)
+    with pytest.raises(ValueError, match="no region 7"):
+        palpate.Model([palpate.Body(mesh, material=wall, regions={7: wall})])
+    with pytest.raises(ValueError, match="no fibre direction"):
+        palpate.Model([palpate.Body(cube, material=palpate.Material(law="hgo"))])
+    with pytest.raises(ValueError, match="fibres"):
+        palpate.Mesh(cube.nodes, cube.tetrahedra, fibres=np.zeros((count, 4, 3)))
+    (tmp_path / "case.bml").write_text(
+        "TREE{ NE artery.vtk  MT{ law neo-hookean }  MT region 1 { law hgo  k1 3000 } }"
+    )
+    read = palpate.read_model(tmp_path / "case.bml").bodies[0]
+    assert read.regions == {1: palpate.Material(law="hgo", k1=3000.0)}
+    assert read.mesh == mesh

@@ -12,7 +12,20 @@ _Int64 = npt.NDArray[np.int64]
 _Index = npt.NDArray[np.int32]
 _Vec3 = tuple[float, float, float]
 _Quaternion = tuple[float, float, float, float]
-_Material = tuple[str, float, float, float, float, float]
+_Material = tuple[
+    str,
+    float,
+    float,
+    float,
+    float,
+    float,
+    float,
+    float,
+    float,
+    float,
+    _Vec3 | None,
+    _Vec3 | None,
+]
 _Contact = tuple[float, float | None, float | None, bool]
 _Key = tuple[float, _Vec3, _Quaternion]
 _Stats = tuple[float, float, float, int, int, int, int, int, int]
@@ -42,6 +55,7 @@ class Mesh:
         triangles: _Int64 | None,
         node_sets: dict[str, _Int64],
         regions: _Int64 | None,
+        fibres: Sequence[_Float64],
         repair: bool,
     ) -> tuple[Mesh, list[str]]: ...
     @property
@@ -61,6 +75,8 @@ class Mesh:
     @property
     def regions(self) -> _Index | None: ...
     @property
+    def fibres(self) -> list[_Float64]: ...
+    @property
     def volume(self) -> float: ...
     def validate(self) -> list[tuple[str, int, list[int], str]]: ...
     def with_nodes(self, nodes: _Float64) -> Mesh: ...
@@ -76,6 +92,7 @@ class Body:
         name: str,
         mesh: Mesh,
         material: _Material,
+        regions: dict[int, _Material],
         fixed_nodes: _Int64,
         rigid: Sequence[_Key] | None,
         contact: _Contact,
@@ -96,6 +113,8 @@ class Body:
     def processor(self) -> int | None: ...
     @property
     def material(self) -> _Material: ...
+    @property
+    def regions(self) -> dict[int, _Material]: ...
     @property
     def fixed_nodes(self) -> _Index: ...
     @property

@@ -60,7 +60,7 @@ def read_mesh(path: str | os.PathLike[str], *, repair: bool = False) -> Mesh:
 def write_mesh(path: str | os.PathLike[str], mesh: Mesh) -> None:
     """Write a mesh; the extension names the format, the file is complete or absent.
 
-    Node sets and regions travel in ``.seg``; other formats keep what they can.
+    Node sets, regions and fibres travel in ``.seg``; other formats keep what they can.
     """
     path = Path(path)
     if path.suffix.lower() in CORE_FORMATS:
@@ -107,7 +107,7 @@ def _from_meshio(raw: Any, repair: bool) -> Mesh:
         points = np.column_stack([points, np.zeros(len(points))])
     solid = any(block.type in _TETRAHEDRA and len(block.data) for block in raw.cells)
     wanted, corners = (_TETRAHEDRA, 4) if solid else (_TRIANGLES, 3)
-    cells, regions, notes = [], [], []
+    cells, regions, fibres, notes = [], [], [], []
     left_out: Counter[str] = Counter()
     for index, block in enumerate(raw.cells):
         if block.type not in wanted:
@@ -117,6 +117,7 @@ def _from_meshio(raw: Any, repair: bool) -> Mesh:
             notes.append(f"{len(block.data)} {block.type} cells: only their corners are used")
         cells.append(np.asarray(block.data, dtype=np.int64)[:, :corners])
         regions.append(_region_data(raw, index, len(block.data)))
+        fibres.append(_fibre_data(raw, index, len(block.data)))
     if not cells:
         found = ", ".join(sorted(left_out)) or "no cells"
         raise MeshError(f"no tetrahedra and no triangles in it (found: {found})")
@@ -144,6 +145,11 @@ def _from_meshio(raw: Any, repair: bool) -> Mesh:
                 for part, numbers in zip(cells, regions, strict=True)
             ]
         )
+    directions = None
+    if solid and any(np.any(part) for part in fibres):
+        directions = np.concatenate(fibres)
+        if not np.any(directions[:, 1]):
+            directions = directions[:, 0]
     node_sets = {}
     for name, members in (getattr(raw, "point_sets", None) or {}).items():
         if not merged:
@@ -155,6 +161,7 @@ def _from_meshio(raw: Any, repair: bool) -> Mesh:
         None if solid else elements,
         node_sets=node_sets,
         regions=region_numbers,
+        fibres=directions,
         repair=repair,
     )
     return Mesh._from_core(mesh._core, [*notes, *mesh.notes])
@@ -169,6 +176,18 @@ def _region_data(raw: Any, block: int, count: int) -> Any:
             if numbers.shape == (count,) and np.all(numbers == np.round(numbers)):
                 return numbers.astype(np.int64)
     return None
+
+
+def _fibre_data(raw: Any, block: int, count: int) -> Any:
+    """Fibre directions of both families, shape (count, 2, 3), zero where there are none."""
+    fibres = np.zeros((count, 2, 3))
+    for family, names in enumerate((("fibres", "fibers"), ("fibres_2", "fibers_2"))):
+        for name in names:
+            data = raw.cell_data.get(name)
+            if data is not None and np.shape(data[block]) == (count, 3):
+                fibres[:, family] = data[block]
+                break
+    return fibres
 
 
 def _merge_equal_points(points: Any, elements: Any) -> tuple[Any, Any, int]:
@@ -201,9 +220,13 @@ def _write_with_meshio(path: Path, mesh: Mesh) -> None:
     cells = [("tetra", mesh.tetrahedra)] if solid else [("triangle", mesh.triangles)]
     if path.suffix.lower() in (".stl", ".obj", ".ply", ".off"):
         cells = [("triangle", mesh.triangles)]
-    cell_data = {}
+    cell_data: dict[str, list[Any]] = {}
     if mesh.regions is not None and cells[0][0] == "tetra":
         cell_data["region"] = [mesh.regions]
+    if mesh.fibres is not None and cells[0][0] == "tetra":
+        families = mesh.fibres.reshape(len(mesh.tetrahedra), -1, 3)
+        for family, name in zip(np.moveaxis(families, 1, 0), ("fibres", "fibres_2"), strict=False):
+            cell_data[name] = [family]
     raw = meshio.Mesh(mesh.nodes, cells, cell_data=cell_data)
     # Written next to its place and renamed, so that the file is complete or absent; some formats
     # (TetGen) are several files, which all move.

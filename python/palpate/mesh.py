@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
+import numpy as np
 import numpy.typing as npt
 
 from palpate import _arrays, _core
@@ -44,6 +45,9 @@ class Mesh:
         Named sets of nodes.
     regions : array_like of int, shape (m,), optional
         Region number of each tetrahedron.
+    fibres : array_like, shape (m, 3) or (m, 2, 3), optional
+        Direction of the fibres of each tetrahedron, of one or two families; any length, zero
+        where there is none.
     repair : bool
         Re-orient inverted tetrahedra, drop degenerate and duplicate ones and unused nodes, instead
         of refusing them. What was done is in ``notes``.
@@ -62,6 +66,7 @@ class Mesh:
         *,
         node_sets: Mapping[str, npt.ArrayLike] | None = None,
         regions: npt.ArrayLike | None = None,
+        fibres: npt.ArrayLike | None = None,
         repair: bool = False,
     ) -> None:
         if tetrahedra is not None and triangles is not None:
@@ -78,6 +83,7 @@ class Mesh:
             None if triangles is None else _arrays.indices(triangles, "triangles", 3),
             sets,
             None if regions is None else _arrays.indices(regions, "regions", None),
+            [] if fibres is None else _families(fibres),
             bool(repair),
         )
 
@@ -129,6 +135,16 @@ class Mesh:
         return self._core.regions
 
     @cached_property
+    def fibres(self) -> Float64Array | None:
+        """Fibre direction of each tetrahedron, shape (m, 3), of two families (m, 2, 3), or None."""
+        first, second = self._core.fibres
+        if len(second) == 0:
+            return first if len(first) else None
+        both = np.stack([first if len(first) else np.zeros_like(second), second], axis=1)
+        both.flags.writeable = False
+        return both
+
+    @cached_property
     def volume(self) -> float:
         """Volume [m³]: of the tetrahedra, or enclosed by a closed surface."""
         return self._core.volume
@@ -162,6 +178,16 @@ class Mesh:
             f"Mesh({len(self.nodes)} nodes, {len(self.tetrahedra)} tetrahedra, "
             f"{len(self.triangles)} surface triangles)"
         )
+
+
+def _families(fibres: npt.ArrayLike) -> list[Float64Array]:
+    """One array of shape (m, 3) for each family."""
+    array = np.asarray(fibres)
+    if array.ndim == 3 and array.shape[1] in (1, 2):
+        return [_arrays.points(array[:, family], "fibres") for family in range(array.shape[1])]
+    if array.ndim == 3:
+        raise ValueError(f"fibres: expected shape (m, 3) or (m, 2, 3), got {array.shape}")
+    return [_arrays.points(fibres, "fibres")]
 
 
 def as_mesh(value: Any, name: str) -> Mesh:

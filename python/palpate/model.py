@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -22,10 +22,16 @@ MODELS = Path(__file__).parent / "models"
 
 @dataclass(frozen=True)
 class Material:
-    """Material of a body; the defaults are a generic soft organ.
+    """Material of a body or a region; the defaults are a generic soft organ.
 
-    ``young`` [Pa], ``poisson`` in (-1, 0.5), ``density`` [kg/m³], Rayleigh ``damping``
-    proportional to stiffness [s] and ``mass_damping`` proportional to mass [1/s].
+    ``law`` is one of ``linear``, ``corotated``, ``stvk``, ``neo-hookean``, ``mooney-rivlin``,
+    ``hgo``. ``young`` [Pa] and ``poisson`` in (-1, 0.5) are those of small strain, ``density``
+    [kg/m³]. ``damping`` [s] is Rayleigh's, proportional to stiffness, and the viscosity of the
+    nonlinear laws; ``mass_damping`` [1/s] is proportional to mass.
+
+    ``mooney``, 0 to 1, is the share of the second invariant in ``mooney-rivlin``. ``k1`` [Pa],
+    ``k2`` and the dispersion ``kappa``, 0 to 1/3, are those of the fibres of ``hgo``; ``fibre``
+    and ``fibre_2`` their directions, None for those of the mesh.
     """
 
     law: str = "linear"
@@ -34,6 +40,28 @@ class Material:
     density: float = 1_000.0
     damping: float = 0.01
     mass_damping: float = 0.0
+    mooney: float = 0.2
+    k1: float = 2363.2
+    k2: float = 0.8393
+    kappa: float = 0.0
+    fibre: tuple[float, float, float] | None = None
+    fibre_2: tuple[float, float, float] | None = None
+
+    def _row(self, name: str) -> _core._Material:
+        return (
+            self.law,
+            self.young,
+            self.poisson,
+            self.density,
+            self.damping,
+            self.mass_damping,
+            self.mooney,
+            self.k1,
+            self.k2,
+            self.kappa,
+            None if self.fibre is None else _arrays.vector(self.fibre, f"{name}: fibre"),
+            None if self.fibre_2 is None else _arrays.vector(self.fibre_2, f"{name}: fibre_2"),
+        )
 
 
 @dataclass(frozen=True)
@@ -69,12 +97,14 @@ class Body:
 
     ``rigid`` is None for a deformable body, otherwise the keys of its motion; no keys: it is
     fixed. ``fixed_nodes`` are held in place. ``processor`` is the paper's PE, None when the body is
-    assigned automatically. ``color`` (red, green, blue in 0..1) and ``opacity`` are for pictures.
+    assigned automatically. ``regions`` maps region numbers of the mesh to materials of their own
+    (damping is the body's). ``color`` (red, green, blue in 0..1) and ``opacity`` are for pictures.
     """
 
     mesh: Mesh
     name: str = "body"
     material: Material = field(default_factory=Material)
+    regions: Mapping[int, Material] = field(default_factory=dict)
     fixed_nodes: npt.ArrayLike = ()
     rigid: Sequence[RigidKey] | None = None
     contact: Contact = field(default_factory=Contact)
@@ -85,11 +115,12 @@ class Body:
 
     def _to_core(self) -> _core.Body:
         as_mesh(self.mesh, f"body {self.name!r}: mesh")
-        m, c = self.material, self.contact
+        c, label = self.contact, f"body {self.name!r}"
         return _core.Body(
             str(self.name),
             self.mesh._core,
-            (m.law, m.young, m.poisson, m.density, m.damping, m.mass_damping),
+            self.material._row(label),
+            {int(region): material._row(label) for region, material in self.regions.items()},
             _arrays.indices(self.fixed_nodes, f"body {self.name!r}: fixed_nodes", None),
             None
             if self.rigid is None
@@ -108,6 +139,7 @@ class Body:
             mesh=Mesh._from_core(core.mesh),
             name=core.name,
             material=Material(*core.material),
+            regions={region: Material(*row) for region, row in core.regions.items()},
             fixed_nodes=core.fixed_nodes,
             rigid=None if keys is None else tuple(RigidKey(*key) for key in keys),
             contact=Contact(*core.contact),

@@ -29,6 +29,7 @@ impl From<Mesh> for PyMesh {
 impl PyMesh {
     /// Builds a mesh and says what repair did.
     #[staticmethod]
+    #[expect(clippy::too_many_arguments, reason = "called by `palpate.Mesh` only, by position")]
     fn build(
         py: Python<'_>,
         nodes: PyReadonlyArray2<'_, f64>,
@@ -36,6 +37,7 @@ impl PyMesh {
         triangles: Option<PyReadonlyArray2<'_, i64>>,
         node_sets: BTreeMap<String, PyReadonlyArray1<'_, i64>>,
         regions: Option<PyReadonlyArray1<'_, i64>>,
+        fibres: Vec<PyReadonlyArray2<'_, f64>>,
         repair: bool,
     ) -> PyResult<(Self, Vec<String>)> {
         let mut data =
@@ -73,6 +75,9 @@ impl PyMesh {
                     })
                 })
                 .collect::<PyResult<_>>()?;
+        }
+        for (family, array) in fibres.iter().enumerate() {
+            data.fibres[family] = arrays::points(array, "fibres")?.to_vec();
         }
         let built = py.detach(|| {
             if repair {
@@ -128,6 +133,12 @@ impl PyMesh {
     fn regions<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<i32>>> {
         let regions = self.mesh.regions();
         (!regions.is_empty()).then(|| vector(py, regions.to_vec()))
+    }
+
+    /// Fibre directions, one array for each family; empty arrays for none.
+    #[getter]
+    fn fibres<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyArray2<f64>>>> {
+        self.mesh.fibres().iter().map(|fibres| matrix(py, fibres.clone())).collect()
     }
 
     #[getter]

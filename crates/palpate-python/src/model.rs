@@ -1,5 +1,6 @@
 //! `palpate._core.Body` and `Model`, and reading them from the model language.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -7,8 +8,8 @@ use glam::{DQuat, DVec3};
 use numpy::{PyArray1, PyReadonlyArray1};
 use palpate::Model;
 use palpate::model::{
-    Appearance, Body, ContactSettings, Document, LoadError, Material, MeshLoader, ReadMesh,
-    RigidKey, RigidMotion, Structure, load_model as load,
+    Appearance, Body, BodyError, ContactSettings, Document, LoadError, Material, MeshLoader,
+    ReadMesh, RigidKey, RigidMotion, Structure, load_model as load,
 };
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -20,7 +21,8 @@ use crate::mesh::PyMesh;
 
 type Vec3 = (f64, f64, f64);
 type Quaternion = (f64, f64, f64, f64);
-type MaterialRow = (String, f64, f64, f64, f64, f64);
+type MaterialRow =
+    (String, f64, f64, f64, f64, f64, f64, f64, f64, f64, Option<Vec3>, Option<Vec3>);
 type ContactRow = (f64, Option<f64>, Option<f64>, bool);
 type KeyRow = (f64, Vec3, Quaternion);
 
@@ -38,6 +40,7 @@ impl PyBody {
         name: String,
         mesh: &PyMesh,
         material: MaterialRow,
+        regions: BTreeMap<i32, MaterialRow>,
         fixed_nodes: PyReadonlyArray1<'_, i64>,
         rigid: Option<Vec<KeyRow>>,
         contact: ContactRow,
@@ -47,9 +50,11 @@ impl PyBody {
         opacity: f64,
     ) -> PyResult<Self> {
         let mut body = Body::new(name, Arc::clone(&mesh.mesh));
-        let (law, young, poisson, density, damping, mass_damping) = material;
-        let law = law.parse().map_err(|error| invalid(&body, &error))?;
-        body.material = Material { law, young, poisson, density, damping, mass_damping };
+        body.material = material_from_row(material).map_err(|error| invalid(&body, &error))?;
+        let regions =
+            regions.into_iter().map(|(region, row)| Ok((region, material_from_row(row)?)));
+        body.regions =
+            regions.collect::<Result<_, BodyError>>().map_err(|error| invalid(&body, &error))?;
         let (friction, distance, stiffness, self_contact) = contact;
         body.contact = ContactSettings { friction, distance, stiffness, self_contact };
         let label = format!("body {:?}: fixed_nodes", body.name);
@@ -107,8 +112,13 @@ impl PyBody {
 
     #[getter]
     fn material(&self) -> MaterialRow {
-        let m = &self.body.material;
-        (m.law.to_string(), m.young, m.poisson, m.density, m.damping, m.mass_damping)
+        material_row(&self.body.material)
+    }
+
+    #[getter]
+    fn regions(&self) -> BTreeMap<i32, MaterialRow> {
+        let regions = self.body.regions.iter();
+        regions.map(|(region, material)| (*region, material_row(material))).collect()
     }
 
     #[getter]
@@ -149,6 +159,43 @@ impl PyBody {
     fn opacity(&self) -> f64 {
         self.body.appearance.opacity
     }
+}
+
+fn material_from_row(row: MaterialRow) -> Result<Material, BodyError> {
+    let (law, young, poisson, density, damping, mass_damping, mooney, k1, k2, kappa, a, b) = row;
+    let (law, fibres) = (law.parse()?, [a, b].map(|fibre| fibre.map(Into::into)));
+    Ok(Material {
+        law,
+        young,
+        poisson,
+        density,
+        damping,
+        mass_damping,
+        mooney,
+        k1,
+        k2,
+        kappa,
+        fibres,
+    })
+}
+
+fn material_row(m: &Material) -> MaterialRow {
+    let [a, b] = m.fibres.map(|fibre| fibre.map(Into::into));
+    let law = m.law.to_string();
+    (
+        law,
+        m.young,
+        m.poisson,
+        m.density,
+        m.damping,
+        m.mass_damping,
+        m.mooney,
+        m.k1,
+        m.k2,
+        m.kappa,
+        a,
+        b,
+    )
 }
 
 fn invalid(body: &Body, error: &dyn std::fmt::Display) -> PyErr {

@@ -90,6 +90,15 @@ def _describe_body(body: Body, core: Any) -> dict[str, Any]:
             "damping": material.damping,
             "mass_damping": material.mass_damping,
         },
+        "regions": {
+            str(region): {
+                "law": each.law,
+                "young": each.young,
+                "poisson": each.poisson,
+                "density": each.density,
+            }
+            for region, each in body.regions.items()
+        },
         "contact": {
             "friction": contact.friction,
             "distance": contact.distance,
@@ -145,7 +154,8 @@ def _print_report(path: str, report: dict[str, Any], notes: tuple[str, ...]) -> 
     out.print(
         table(
             "Behaviour",
-            "body<|kind<|young [Pa]|poisson|density [kg/m³]|fixed nodes|friction|self-contact<",
+            "body<|kind<|law<|young [Pa]|poisson|density [kg/m³]|fixed nodes|friction|"
+            "self-contact<",
             [
                 (
                     each["name"],
@@ -189,11 +199,13 @@ def _quality_texts(quality: dict[str, float] | None) -> tuple[str, str]:
     return f"{quality['min']:.2f}", f"{quality['median']:.2f}"
 
 
-def _material_texts(body: dict[str, Any]) -> tuple[str, str, str]:
+def _material_texts(body: dict[str, Any]) -> tuple[str, str, str, str]:
     if body["rigid"] is not None:
-        return "-", "-", "-"
+        return "-", "-", "-", "-"
     material = body["material"]
-    return f"{material['young']:g}", f"{material['poisson']:g}", f"{material['density']:g}"
+    laws = dict.fromkeys([material["law"], *(each["law"] for each in body["regions"].values())])
+    young, poisson, density = (f"{material[name]:g}" for name in ("young", "poisson", "density"))
+    return ", ".join(laws), young, poisson, density
 
 
 def _rotation_text(placement: dict[str, Any]) -> str:
