@@ -9,6 +9,7 @@
 
 mod adjacency;
 mod boxes;
+mod crossing;
 mod features;
 mod hierarchy;
 mod nearest;
@@ -28,6 +29,7 @@ use crate::scene::DetectionMemory;
 use crate::simd::Isa;
 use adjacency::{Adjacency, Incidence};
 pub(crate) use boxes::Block;
+pub(crate) use crossing::CrossTriangles;
 pub(crate) use features::{EdgePairs, VertexPairs};
 pub(crate) use hierarchy::Hierarchy;
 pub(crate) use nearest::{BlockMeasure, WideSurface};

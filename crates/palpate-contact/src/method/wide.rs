@@ -18,8 +18,8 @@ use crate::scene::{
 };
 use crate::simd::Isa;
 use crate::wide::{
-    EdgePairs, Reach, SeparateTriangles, Sides, Traversal, VertexPairs, WideBody, WideSurface,
-    bytes,
+    CrossTriangles, EdgePairs, Reach, SeparateTriangles, Sides, Traversal, VertexPairs, WideBody,
+    WideSurface, bytes,
 };
 
 /// Block pairs of the upper levels in a task.
@@ -110,7 +110,11 @@ struct Worker<T> {
     /// Slot pairs whose boxes meet.
     candidates: Vec<[u32; 2]>,
     groups: Vec<Group>,
+    /// Of those, what a filter passed on.
     kept: Vec<[u32; 2]>,
+    /// Of those, what certainly meets, and what is to be tested.
+    crossing: Vec<[u32; 2]>,
+    open: Vec<[u32; 2]>,
     found: Vec<T>,
     cost: Cost,
     /// Spent until the end of the traversal, and of all.
@@ -125,6 +129,8 @@ impl<T> Default for Worker<T> {
             candidates: Vec::new(),
             groups: Vec::new(),
             kept: Vec::new(),
+            crossing: Vec::new(),
+            open: Vec::new(),
             found: Vec::new(),
             cost: Cost::default(),
             times: [Duration::ZERO; 2],
@@ -134,8 +140,9 @@ impl<T> Default for Worker<T> {
 
 impl<T> Worker<T> {
     fn bytes(&self) -> usize {
-        let Self { traversal, candidates, groups, kept, found, .. } = self;
-        traversal.bytes() + bytes(candidates) + bytes(groups) + bytes(kept) + bytes(found)
+        let Self { traversal, candidates, groups, kept, crossing, open, found, .. } = self;
+        let lists = bytes(candidates) + bytes(kept) + bytes(crossing) + bytes(open);
+        traversal.bytes() + bytes(groups) + lists + bytes(found)
     }
 }
 
@@ -411,7 +418,7 @@ impl Search<'_> {
 
     /// Tests the candidates for intersection.
     fn meeting(&self, worker: &mut Worker<TrianglePair>) {
-        let Worker { candidates, groups, kept, found, cost, .. } = worker;
+        let Worker { candidates, groups, kept, crossing, open, found, cost, .. } = worker;
         found.clear();
         let mut start = 0;
         for group in groups.iter() {
@@ -419,41 +426,42 @@ impl Search<'_> {
             let pair = &search.pair;
             let (a, b) = (&self.bodies[pair.a as usize], &self.bodies[pair.b as usize]);
             let reach = Reach::new(a, b, 0.0);
-            kept.clear();
             let candidates = &candidates[start..group.end];
             start = group.end;
+            crossing.clear();
+            open.clear();
             let neighbours = matches!(search.elements, Elements::Neighbours);
             if neighbours {
-                kept.extend_from_slice(candidates);
+                open.extend_from_slice(candidates);
             } else {
+                kept.clear();
                 self.isa.run(SeparateTriangles { a, b, reach, candidates, kept });
+                self.isa.run(CrossTriangles { a, b, reach, candidates: kept, crossing, open });
             }
             let (body_a, body_b) =
                 (&self.frame.bodies[pair.a as usize], &self.frame.bodies[pair.b as usize]);
+            let triangles = |&[slot_a, slot_b]: &[u32; 2]| {
+                [a.triangles.element(slot_a), b.triangles.element(slot_b)]
+            };
             if let Some(groups) = self.frame.common_groups(body_a, body_b) {
-                kept.retain(|&[slot_a, slot_b]| {
-                    let triangles = [a.triangles.element(slot_a), b.triangles.element(slot_b)];
-                    !groups.of_triangles(triangles)
-                });
+                crossing.retain(|slots| !groups.of_triangles(triangles(slots)));
+                open.retain(|slots| !groups.of_triangles(triangles(slots)));
             }
-            cost.polygon_tests += kept.len() as u64;
-            for &[slot_a, slot_b] in kept.iter() {
-                let (mut triangle_a, mut triangle_b) =
-                    (a.triangles.element(slot_a), b.triangles.element(slot_b));
-                let meet = if neighbours {
-                    neighbours_meet(body_a, [triangle_a, triangle_b])
-                } else {
-                    let points = (body_a.triangle(triangle_a), body_b.triangle(triangle_b));
-                    triangles_intersect(&points.0, &points.1)
-                };
-                if meet {
-                    if pair.is_self() && triangle_b < triangle_a {
-                        std::mem::swap(&mut triangle_a, &mut triangle_b);
-                    }
-                    let (body_a, body_b) = (pair.a, pair.b);
-                    found.push(TrianglePair { body_a, triangle_a, body_b, triangle_b });
+            cost.polygon_tests += (crossing.len() + open.len()) as u64;
+            let meet = |slots: &&[u32; 2]| {
+                let [triangle_a, triangle_b] = triangles(slots);
+                if neighbours {
+                    return neighbours_meet(body_a, [triangle_a, triangle_b]);
                 }
-            }
+                triangles_intersect(&body_a.triangle(triangle_a), &body_b.triangle(triangle_b))
+            };
+            found.extend(crossing.iter().chain(open.iter().filter(meet)).map(|slots| {
+                let [mut triangle_a, mut triangle_b] = triangles(slots);
+                if pair.is_self() && triangle_b < triangle_a {
+                    std::mem::swap(&mut triangle_a, &mut triangle_b);
+                }
+                TrianglePair { body_a: pair.a, triangle_a, body_b: pair.b, triangle_b }
+            }));
         }
     }
 

@@ -27,6 +27,11 @@ impl Reach {
         Self { margin, scale: 8.0 * largest }
     }
 
+    /// At most how far a coordinate relative to a common point is off, in `f32`: 2⁻²² of the largest.
+    pub(super) fn coordinate_error(self) -> f32 {
+        self.scale / 33_554_432.0
+    }
+
     /// Lanes where the points of `a` and `b`, relative to a common point, lie on two sides of a slab
     /// across `axis` wider than the margin. Any axis is right, the best is along the closest points.
     #[inline(always)]
@@ -107,16 +112,7 @@ impl Kernel for SeparateTriangles<'_> {
     fn run<L: Lanes>(self) {
         let Self { a, b, reach, candidates, kept } = self;
         for batch in candidates.chunks(WIDTH) {
-            // Lanes beyond the last candidate repeat the first.
-            let lane = |i: usize| batch.get(i).unwrap_or(&batch[0]);
-            let slots = |side: usize, body: &WideBody| {
-                std::array::from_fn(|i| body.triangles.corners[lane(i)[side] as usize])
-            };
-            let [a0, a1, a2] = corners::<L>(&a.nodes, &slots(0, a));
-            let of_b = corners::<L>(&b.nodes, &slots(1, b));
-            let zero = [L::splat(0.0); 3];
-            let of_a = [zero, sub(a1, a0), sub(a2, a0)];
-            let of_b = [sub(of_b[0], a0), sub(of_b[1], a0), sub(of_b[2], a0)];
+            let (of_a, of_b) = from_corner::<L>(a, b, batch);
             let (edges_a, edges_b) = (edges(of_a), edges(of_b));
             let normal_a = cross(edges_a[0], edges_a[1]);
             let normal_b = cross(edges_b[0], edges_b[1]);
@@ -138,7 +134,26 @@ impl Kernel for SeparateTriangles<'_> {
     }
 }
 
+/// The corners of up to eight pairs of triangles, relative to the first of a. Lanes beyond the last
+/// candidate repeat the first.
 #[inline(always)]
-fn edges<L: Lanes>([a, b, c]: [[L; 3]; 3]) -> [[L; 3]; 3] {
+pub(super) fn from_corner<L: Lanes>(
+    a: &WideBody,
+    b: &WideBody,
+    batch: &[[u32; 2]],
+) -> ([[L; 3]; 3], [[L; 3]; 3]) {
+    let lane = |i: usize| batch.get(i).unwrap_or(&batch[0]);
+    let slots = |side: usize, body: &WideBody| {
+        std::array::from_fn(|i| body.triangles.corners[lane(i)[side] as usize])
+    };
+    let [a0, a1, a2] = corners::<L>(&a.nodes, &slots(0, a));
+    let [b0, b1, b2] = corners::<L>(&b.nodes, &slots(1, b));
+    let zero = [L::splat(0.0); 3];
+    ([zero, sub(a1, a0), sub(a2, a0)], [sub(b0, a0), sub(b1, a0), sub(b2, a0)])
+}
+
+/// From each corner to the next.
+#[inline(always)]
+pub(super) fn edges<L: Lanes>([a, b, c]: [[L; 3]; 3]) -> [[L; 3]; 3] {
     [sub(b, a), sub(c, b), sub(a, c)]
 }

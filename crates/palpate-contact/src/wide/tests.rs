@@ -8,7 +8,9 @@ use palpate_model::{Mesh, MeshData};
 use super::adjacency::{Adjacency, bits};
 use super::boxes::Block;
 use super::traverse::{Overlap, Pairs, padding};
-use super::{EdgePairs, Hierarchy, Reach, SeparateTriangles, VertexPairs, WideBody};
+use super::{
+    CrossTriangles, EdgePairs, Hierarchy, Reach, SeparateTriangles, VertexPairs, WideBody,
+};
 use crate::simd::Isa;
 
 struct Random(u64);
@@ -262,8 +264,9 @@ fn kernels_give_the_bits_of_plain_rust(fast: Isa) {
             let edges: Vec<_> = (0..99).map(|_| candidate(counts)).collect();
             let kept = |isa: Isa| {
                 let (a, b) = (&a, &b);
-                let mut lists: [Vec<[u32; 2]>; 3] = Default::default();
-                let [kept, near_nodes, near_edges] = &mut lists;
+                let mut lists: [Vec<[u32; 2]>; 5] = Default::default();
+                let [kept, near_nodes, near_edges, crossing, open] = &mut lists;
+                isa.run(CrossTriangles { a, b, reach, candidates: &triangles, crossing, open });
                 isa.run(SeparateTriangles { a, b, reach, candidates: &triangles, kept });
                 let kept = near_nodes;
                 isa.run(VertexPairs { from: a, to: b, reach, candidates: &nodes, kept });
@@ -274,8 +277,52 @@ fn kernels_give_the_bits_of_plain_rust(fast: Isa) {
             let lists = kept(fast);
             assert_eq!(lists, kept(Isa::Scalar));
             if round % 3 == 0 {
-                assert!(lists.iter().all(|list| (margin < 1.0) == (list.len() < 99)), "{margin}");
+                let filtered = &lists[..3];
+                let some = |list: &Vec<_>| (margin < 1.0) == (list.len() < 99);
+                assert!(filtered.iter().all(some), "{margin}");
+                assert!(!lists[3].is_empty() && !lists[4].is_empty());
             }
         }
     }
+}
+
+#[test]
+fn what_certainly_crosses_meets() {
+    let mut random = Random(19);
+    let mut certain = 0;
+    for round in 0..600 {
+        let meshes = [60, 60].map(|count| tangle(count, &mut random));
+        let moved = [0, 1].map(|i| positions(&meshes[i], round, &mut random));
+        let origin = if round % 2 == 0 { [0.0; 3] } else { moved[0][0] };
+        let [a, b] = [0, 1].map(|i| {
+            let mut body = WideBody::pack(&meshes[i]);
+            body.refit(Isa::detect(), &moved[i], origin);
+            body
+        });
+        let all: Vec<[u32; 2]> = (0..60).flat_map(|i| (0..60).map(move |j| [i, j])).collect();
+        let reach = Reach::new(&a, &b, 0.0);
+        let mut lists = [Vec::new(), Vec::new()];
+        let [crossing, open] = &mut lists;
+        Isa::detect().run(CrossTriangles { a: &a, b: &b, reach, candidates: &all, crossing, open });
+        let [crossing, open] = lists;
+        let triangle = |side: usize, element: u32| {
+            meshes[side].triangles()[element as usize].map(|node| moved[side][node as usize])
+        };
+        for &[i, j] in &crossing {
+            let (p, q) = (triangle(0, a.triangles.element(i)), triangle(1, b.triangles.element(j)));
+            assert!(palpate_geometry::triangles_intersect(&p, &q), "{p:?} {q:?}");
+        }
+        assert_eq!(crossing.len() + open.len(), all.len());
+        if round % 3 == 0 {
+            let meets = |&&[i, j]: &&[u32; 2]| {
+                let p = triangle(0, a.triangles.element(i));
+                let q = triangle(1, b.triangles.element(j));
+                palpate_geometry::triangles_intersect(&p, &q)
+            };
+            // Nearly all that meet in general position are certain.
+            assert!(open.iter().filter(meets).count() * 50 <= crossing.len());
+            certain += crossing.len();
+        }
+    }
+    assert!(certain > 10_000);
 }
