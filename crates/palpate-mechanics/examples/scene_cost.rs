@@ -1,6 +1,6 @@
 //! What each step of a model costs: contacts, solver effort, speeds and the time of every stage.
 //!
-//! `cargo run --release -p palpate-mechanics --example scene_cost MODEL [STEPS [EVERY [FRICTION]]]`
+//! `cargo run --release -p palpate-mechanics --example scene_cost MODEL [STEPS [EVERY [FRICTION [AHEAD]]]]`
 
 #![allow(clippy::print_stdout)] // it is what the example is for
 
@@ -25,6 +25,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let path = arguments.next().ok_or("give the path of a model")?;
     let mut number = |default: f64| arguments.next().map_or(Ok(default), |text| text.parse());
     let (steps, every, friction) = (number(240.0)? as usize, number(20.0)? as usize, number(-1.0)?);
+    let ahead = number(0.0)?;
     let mut model = load_model(Path::new(&path), &CoreLoader)?;
     if friction >= 0.0 {
         for body in &mut model.bodies {
@@ -33,6 +34,11 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
     let meshes = model.bodies.iter().map(|body| Arc::clone(&body.mesh)).collect();
     let mut dynamics = Dynamics::new(&model, DynamicsOptions::default())?;
+    if ahead > 0.0 {
+        let start = Instant::now();
+        let columns = dynamics.prepare_contact(usize::MAX);
+        println!("{columns} responses solved ahead in {:.2} s", start.elapsed().as_secs_f64());
+    }
     let mut scene = Scene::new(meshes, Some(&model.structure), SceneOptions::default())?;
     println!(
         "step contacts candidates solves changes  residual  max m/s | detect predict filter \

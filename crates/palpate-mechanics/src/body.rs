@@ -172,6 +172,14 @@ impl MovingBody {
         };
     }
 
+    /// Solves up to `count` compliance columns before they are asked for; returns how many.
+    pub(crate) fn prepare_ahead(&mut self, count: usize) -> usize {
+        match &mut self.kind {
+            BodyKind::Elastic(elastic) => self.compliance.prepare_ahead(elastic, count),
+            BodyKind::Rigid { .. } => 0,
+        }
+    }
+
     /// Computes the state after the step under `contact_forces`.
     pub(crate) fn advance(&mut self, time_step: f64) {
         match &mut self.kind {

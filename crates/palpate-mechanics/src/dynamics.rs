@@ -1,5 +1,6 @@
 //! The bodies in motion: two calls per step, with contact detection by the caller between them.
 
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 use palpate_contact::{PenetratingNode, ProximityPair};
@@ -195,6 +196,20 @@ impl Dynamics {
             Some(pool) => pool.install(|| self.tasks.par_iter_mut().for_each(run)),
             None => self.tasks.iter_mut().for_each(run),
         }
+    }
+
+    /// Solves ahead for the response of each body to contact, up to `columns` surface nodes per body;
+    /// returns for how many it was. Zero means that there is nothing left to do, or no memory for it.
+    ///
+    /// The first contact of a node costs a solve otherwise: many at once make a slow step. The results
+    /// are the same bits either way. Call it before the first step, or with a few columns whenever
+    /// there is time.
+    pub fn prepare_contact(&mut self, columns: usize) -> usize {
+        let solved = AtomicUsize::new(0);
+        self.for_each_body(|_, body| {
+            solved.fetch_add(body.prepare_ahead(columns), Ordering::Relaxed);
+        });
+        solved.into_inner()
     }
 
     /// Moves every body as if it were alone, which tells how far to look for contacts.

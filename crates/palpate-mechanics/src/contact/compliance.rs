@@ -2,12 +2,13 @@
 //!
 //! The body's matrix never changes, so a column that was solved once serves every later step. Columns
 //! are single precision: they shape the contact forces, whose response is solved in double precision.
+//! The matrix is symmetric: of each column only the part from the node itself on is kept.
 
 use palpate_model::Mesh;
 
 use crate::body::ElasticBody;
 
-/// Columns of nodes without contact are given up beyond this many bytes per body.
+/// Bytes of columns per body beyond which those of nodes without contact are given up.
 const MEMORY_LIMIT: usize = 128 << 20;
 
 const NONE: u32 = u32::MAX;
@@ -21,14 +22,19 @@ pub(crate) struct ComplianceCache {
     /// Node -> slot.
     slot_of: Vec<u32>,
     slots: Vec<Slot>,
-    values: Vec<[f32; 9]>,
-    capacity: usize,
+    /// Bytes of all columns, and beyond which those of nodes without contact are given up.
+    size: usize,
+    limit: usize,
+    /// Surface nodes before this one have been solved ahead.
+    ahead: usize,
 }
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 struct Slot {
     node: u32,
     last_used: u64,
+    /// Entries of the surface nodes from the column's own on.
+    column: Vec<[f32; 9]>,
 }
 
 impl ComplianceCache {
@@ -38,14 +44,15 @@ impl ComplianceCache {
         for (place, &node) in surface_nodes.iter().enumerate() {
             surface_index[node as usize] = place as u32;
         }
-        let column = size_of::<[f32; 9]>() * surface_nodes.len().max(1);
-        Self {
-            slot_of: vec![NONE; surface_index.len()],
-            surface_index,
-            surface_nodes,
-            capacity: (MEMORY_LIMIT / column).max(1),
-            ..Self::default()
-        }
+        let slot_of = vec![NONE; surface_index.len()];
+        let limit = MEMORY_LIMIT;
+        Self { surface_index, surface_nodes, slot_of, limit, ..Self::default() }
+    }
+
+    /// With another limit than the usual one.
+    #[cfg(test)]
+    pub(super) fn set_limit(&mut self, bytes: usize) {
+        self.limit = bytes;
     }
 
     /// Makes the columns of `nodes` available; returns how many had to be solved.
@@ -57,54 +64,75 @@ impl ComplianceCache {
         }
         let mut solved = 0;
         for &node in nodes {
-            if self.slot_of[node as usize] != NONE || body.free_place(node).is_none() {
-                continue;
+            if self.slot_of[node as usize] == NONE && body.free_place(node).is_some() {
+                self.make_room(self.column_size(node), step);
+                self.solve(body, node, step);
+                solved += 1;
             }
-            let slot = self.vacant_slot(step);
-            self.slots[slot] = Slot { node, last_used: step };
-            self.slot_of[node as usize] = slot as u32;
-            solved += 1;
-            self.solve(body, node, slot);
         }
         solved
     }
 
-    fn solve(&mut self, body: &mut ElasticBody, node: u32, slot: usize) {
-        let count = self.surface_nodes.len();
-        body.solve_compliance(node);
-        let values = &mut self.values[slot * count..(slot + 1) * count];
-        for (value, &other) in values.iter_mut().zip(&self.surface_nodes) {
-            *value = body
-                .free_place(other)
-                .map_or([0.0; 9], |place| body.compliance()[place].map(|x| x as f32));
+    /// Solves up to `count` columns that no step has asked for yet; returns how many that were, fewer
+    /// only when the memory is full or every column is known.
+    pub(crate) fn prepare_ahead(&mut self, body: &mut ElasticBody, count: usize) -> usize {
+        let mut solved = 0;
+        while solved < count && self.ahead < self.surface_nodes.len() {
+            let node = self.surface_nodes[self.ahead];
+            if self.slot_of[node as usize] == NONE && body.free_place(node).is_some() {
+                if self.size + self.column_size(node) > self.limit {
+                    break;
+                }
+                self.solve(body, node, 0);
+                solved += 1;
+            }
+            self.ahead += 1;
         }
+        solved
     }
 
-    /// A slot to fill: a new one while there is memory, else the one unused for longest.
-    fn vacant_slot(&mut self, step: u64) -> usize {
-        if self.slots.len() >= self.capacity {
-            let oldest = self.slots.iter().enumerate().min_by_key(|(_, s)| (s.last_used, s.node));
-            if let Some((slot, &Slot { node, last_used })) = oldest
-                && last_used != step
-            {
-                self.slot_of[node as usize] = NONE;
-                return slot;
+    fn column_size(&self, node: u32) -> usize {
+        size_of::<[f32; 9]>()
+            * (self.surface_nodes.len() - self.surface_index[node as usize] as usize)
+    }
+
+    fn solve(&mut self, body: &mut ElasticBody, node: u32, step: u64) {
+        body.solve_compliance(node);
+        let others = &self.surface_nodes[self.surface_index[node as usize] as usize..];
+        let entries = others.iter().map(|&other| {
+            let place = body.free_place(other);
+            place.map_or([0.0; 9], |place| body.compliance()[place].map(|x| x as f32))
+        });
+        let slot = Slot { node, last_used: step, column: entries.collect() };
+        self.size += size_of_val(&*slot.column);
+        self.slot_of[node as usize] = self.slots.len() as u32;
+        self.slots.push(slot);
+    }
+
+    /// Gives up columns, those unused for longest first, until one of `size` bytes has room or all
+    /// that are left are used in this step.
+    fn make_room(&mut self, size: usize, step: u64) {
+        while self.size + size > self.limit {
+            let slots = self.slots.iter().enumerate();
+            let oldest = slots.min_by_key(|(_, slot)| (slot.last_used, slot.node));
+            let Some((place, _)) = oldest.filter(|(_, slot)| slot.last_used != step) else {
+                return;
+            };
+            let given_up = self.slots.swap_remove(place);
+            self.size -= size_of_val(&*given_up.column);
+            self.slot_of[given_up.node as usize] = NONE;
+            if let Some(moved) = self.slots.get(place) {
+                self.slot_of[moved.node as usize] = place as u32;
             }
         }
-        self.slots.push(Slot { node: NONE, last_used: 0 });
-        self.values.resize(self.slots.len() * self.surface_nodes.len(), [0.0; 9]);
-        self.slots.len() - 1
     }
 
-    /// The prepared column of `node`, to be read at [`ComplianceCache::place`]; `None` when fixed.
-    pub(crate) fn column(&self, node: u32) -> Option<&[[f32; 9]]> {
-        let count = self.surface_nodes.len();
-        let slot = self.slot_of[node as usize];
-        (slot != NONE).then(|| &self.values[slot as usize * count..(slot as usize + 1) * count])
-    }
-
-    /// Where a surface node stands in a column.
-    pub(crate) fn place(&self, node: u32) -> u32 {
-        self.surface_index[node as usize]
+    /// Displacement of node `second` under unit forces on `first`, which must not be the larger one:
+    /// entry `3 * axis + k` is along k under the force along axis [m/N]. `None` if the column is not
+    /// known.
+    pub(crate) fn entry(&self, first: u32, second: u32) -> Option<&[f32; 9]> {
+        let [own, other] = [first, second].map(|node| self.surface_index[node as usize]);
+        let slot = self.slots.get(self.slot_of[first as usize] as usize)?;
+        Some(&slot.column[(other - own) as usize])
     }
 }

@@ -53,3 +53,22 @@ fn a_restored_state_continues_bit_for_bit() {
     fresh.run(20);
     assert_eq!(fresh.dynamics.state(), expected);
 }
+
+#[test]
+fn responses_solved_ahead_change_no_bit() {
+    let run = |columns: usize, threads: usize| {
+        let mut world = pile(threads);
+        let solve = || Some(world.dynamics.prepare_contact(columns)).filter(|&solved| solved > 0);
+        let ahead: usize = std::iter::from_fn(solve).sum();
+        let solved: usize = (0..60).map(|_| world.step().new_columns).sum();
+        (bits(&world.dynamics.state()), ahead, solved)
+    };
+    let (lazy, _, needed) = run(0, 1);
+    assert!(needed > 20);
+    for (columns, threads) in [(usize::MAX, 2), (5, 1)] {
+        let (state, ahead, solved) = run(columns, threads);
+        assert!(state == lazy, "{columns} at a time");
+        // Every surface node of the four blocks.
+        assert_eq!((ahead, solved), (4 * 44, 0));
+    }
+}
