@@ -32,7 +32,7 @@ pub(crate) struct Effort {
 
 impl Default for Effort {
     fn default() -> Self {
-        Self { changes: 8.0, tolerance: 1e-3 }
+        Self { changes: 8.0, tolerance: 1e-4 }
     }
 }
 
