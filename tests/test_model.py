@@ -180,8 +180,8 @@ def test_materials_of_regions_and_fibres(tmp_path, cube):
     )
     model = palpate.Model([body])
     assert model.bodies[0].regions == {1: wall}
-    with pytest.raises(palpate.SimulationError, match="'artery' has law neo-hookean"):
-        palpate.Simulation(model)
+    report = palpate.Simulation(model).step(3)
+    assert report.newton_iterations >= 3
     with pytest.raises(ValueError, match="no region 7"):
         palpate.Model([palpate.Body(mesh, material=wall, regions={7: wall})])
     with pytest.raises(ValueError, match="no fibre direction"):

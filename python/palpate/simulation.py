@@ -23,8 +23,10 @@ class StepReport:
 
     ``times`` maps a stage to seconds, summed over the steps; ``contacts`` carry a force,
     ``penetrating_nodes`` were inside another body at the start of the last step, by at most
-    ``max_depth`` [m]; ``iterations`` are the contact solver's changes of a force, summed; ``residual``
-    is the largest error of a gap or slip that it left in the last step, in contact distances.
+    ``max_depth`` [m]; ``newton_iterations`` are the quasi-Newton iterations of the body that took
+    most (none with the linear law), ``iterations`` the contact solver's changes of a force, both
+    summed; ``residual`` is the largest error of a gap or slip that it left in the last step, in
+    contact distances.
     """
 
     step: int

@@ -41,8 +41,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
     let mut scene = Scene::new(meshes, Some(&model.structure), SceneOptions::default())?;
     println!(
-        "step contacts candidates solves changes  residual  max m/s | detect predict filter \
-         compliance solve advance = mechanics [ms]"
+        "step contacts candidates newton refactored changes  residual  max m/s | detect predict \
+         filter compliance solve advance refactor = mechanics [ms]"
     );
     let (mut mechanics, mut detection) = (Vec::new(), Vec::new());
     for step in 1..=steps {
@@ -59,7 +59,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         detect += start.elapsed();
         let stats = dynamics.finish_step(&pairs, &penetration)?;
         let t = stats.times;
-        let milliseconds = [t.predict, t.filter, t.compliance, t.solve, t.advance]
+        let milliseconds = [t.predict, t.filter, t.compliance, t.solve, t.advance, t.refactor]
             .map(|time| time.as_secs_f64() * 1e3);
         let sum: f64 = milliseconds.iter().sum();
         let detect = detect.as_secs_f64() * 1e3;
@@ -71,13 +71,14 @@ fn main() -> Result<(), Box<dyn Error>> {
                 .flat_map(|body| dynamics.velocities(body))
                 .map(|v| v.iter().map(|x| x * x).sum::<f64>().sqrt())
                 .fold(0.0, f64::max);
-            let [predict, filter, compliance, solve, advance] = milliseconds;
+            let [predict, filter, compliance, solve, advance, refactor] = milliseconds;
             println!(
-                "{step:4} {:8} {:10} {:6} {:7} {:9.1e} {fastest:8.5} | {detect:6.2} {predict:7.2} \
-                 {filter:6.2} {compliance:10.2} {solve:5.2} {advance:7.2} = {sum:9.2}",
+                "{step:4} {:8} {:10} {:6} {:10} {:6} {:9.1e} {fastest:8.5} | {detect:6.2} {predict:7.2} \
+                 {filter:6.2} {compliance:10.2} {solve:5.2} {advance:7.2} {refactor:7.2} = {sum:9.2}",
                 stats.contacts,
                 stats.candidates,
                 stats.newton_iterations,
+                stats.refactored,
                 stats.iterations,
                 stats.residual,
             );

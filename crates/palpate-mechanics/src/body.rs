@@ -12,6 +12,7 @@ use palpate_model::{Body, RigidMotion};
 
 use crate::contact::compliance::ComplianceCache;
 use crate::error::MechanicsError;
+use crate::state::BodyState;
 pub(crate) use elastic::ElasticBody;
 
 /// A body in motion. All arrays have one entry per node.
@@ -38,6 +39,8 @@ pub(crate) struct MovingBody {
     pub(crate) new_columns: usize,
     /// Whether contact forces act in this step.
     pub(crate) touched: bool,
+    /// Whether the last step ended with a new matrix.
+    pub(crate) refactored: bool,
 }
 
 /// How far the surface moves in the step that has begun.
@@ -89,6 +92,7 @@ impl MovingBody {
             compliance,
             new_columns: 0,
             touched: false,
+            refactored: false,
             kind,
         };
         match &result.kind {
@@ -223,15 +227,35 @@ impl MovingBody {
         self.elastic().map_or_else(Vec::new, ElasticBody::shape)
     }
 
-    pub(crate) fn set_shape(&mut self, shape: &[Point]) {
-        if let BodyKind::Elastic(elastic) = &mut self.kind {
-            elastic.set_shape(shape);
+    /// Quasi-Newton iterations of the step.
+    pub(crate) fn newton_iterations(&self) -> u32 {
+        self.elastic().map_or(0, ElasticBody::newton_iterations)
+    }
+
+    /// The positions whose stiffness is in use; empty for those of the rest shape.
+    pub(crate) fn stiff_shape(&self) -> &[Point] {
+        self.elastic().map_or(&[], ElasticBody::stiff_shape)
+    }
+
+    /// Goes back to what the response was computed for.
+    pub(crate) fn set_shape(&mut self, saved: &BodyState) {
+        if let BodyKind::Elastic(elastic) = &mut self.kind
+            && elastic.set_shape(saved)
+        {
+            self.compliance.clear();
         }
     }
 
     pub(crate) fn commit(&mut self) {
         std::mem::swap(&mut self.positions, &mut self.next_positions);
         std::mem::swap(&mut self.velocities, &mut self.next_velocities);
+        self.refactored = match &mut self.kind {
+            BodyKind::Elastic(elastic) => elastic.refresh_if_slow(&self.positions),
+            BodyKind::Rigid { .. } => false,
+        };
+        if self.refactored {
+            self.compliance.clear();
+        }
     }
 }
 

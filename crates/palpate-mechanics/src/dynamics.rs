@@ -9,7 +9,7 @@ use palpate_model::Model;
 use palpate_solver::FactorStats;
 use rayon::prelude::*;
 
-use crate::body::{MovingBody, first_not_finite};
+use crate::body::{BodyKind, MovingBody, first_not_finite};
 use crate::contact::filter::BodyView;
 use crate::contact::response::Response;
 use crate::contact::{Contact, ContactParameters, Surface};
@@ -56,6 +56,8 @@ pub struct StageTimes {
     pub solve: Duration,
     /// Response to the contact forces and the new state.
     pub advance: Duration,
+    /// New matrices of bodies whose shape has changed.
+    pub refactor: Duration,
 }
 
 /// What a step did and what it cost.
@@ -71,7 +73,11 @@ pub struct StepStats {
     pub iterations: usize,
     /// Solves for the contact forces: more than one when they brought about contacts that were not
     /// expected.
+    pub contact_solves: usize,
+    /// Quasi-Newton iterations of the body that took most; 0 without nonlinear laws.
     pub newton_iterations: usize,
+    /// Bodies whose matrix was made anew, because the iterations became many.
+    pub refactored: usize,
     /// Largest error of a gap or slip that the last solve left, in contact distances.
     pub residual: f64,
     /// Compliance columns that had to be solved.
@@ -317,7 +323,13 @@ impl Dynamics {
                 return Err(MechanicsError::NotFinite { body: index, node, what });
             }
         }
+        let iterations = (0..self.body_count()).map(|body| self.body(body).newton_iterations());
+        stats.newton_iterations = iterations.max().unwrap_or(0) as usize;
+        let start = Instant::now();
         self.for_each_body(|_, body| body.commit());
+        stats.times.refactor = start.elapsed();
+        let refactored = (0..self.body_count()).filter(|&body| self.body(body).refactored);
+        stats.refactored = refactored.count();
         response.remember();
         self.step += 1;
         Ok(stats)
@@ -336,8 +348,7 @@ impl Dynamics {
         let start = Instant::now();
         let cost = response.solve(self.pool.as_ref(), |body| self.body(body));
         stats.iterations += cost.changes;
-
-        stats.newton_iterations += 1;
+        stats.contact_solves += 1;
         stats.residual = cost.residual;
         stats.times.solve += start.elapsed();
     }
@@ -467,6 +478,7 @@ impl Dynamics {
                 velocities: body.velocities.clone(),
                 forces: body.forces.clone(),
                 shape: body.shape(),
+                stiff_shape: body.stiff_shape().to_vec(),
             }
         });
         State {
@@ -492,8 +504,10 @@ impl Dynamics {
             check_array(body, count, &saved.positions, "the position")?;
             check_array(body, count, &saved.velocities, "the velocity")?;
             check_array(body, count, &saved.forces, "the force")?;
-            if !saved.shape.is_empty() {
-                check_array(body, count, &saved.shape, "the shape")?;
+            for shape in [&saved.shape, &saved.stiff_shape] {
+                if !shape.is_empty() {
+                    check_array(body, count, shape, "the shape")?;
+                }
             }
         }
         let fits = |contact: &ContactForce| {
@@ -511,7 +525,7 @@ impl Dynamics {
             body.positions.copy_from_slice(&saved.positions);
             body.velocities.copy_from_slice(&saved.velocities);
             body.forces.copy_from_slice(&saved.forces);
-            body.set_shape(&saved.shape);
+            body.set_shape(saved);
         }
         self.set_contact_forces(&state.contacts);
         self.response.restore(&state.contacts);
@@ -525,10 +539,10 @@ impl Dynamics {
     }
 
     /// Energy of the deformable bodies.
-    pub fn energy(&self) -> Energy {
+    pub fn energy(&mut self) -> Energy {
         let mut energy = Energy::default();
         for index in 0..self.body_count() {
-            energy.add(self.body(index));
+            energy.add(self.body_mut(index));
         }
         energy
     }
@@ -540,6 +554,16 @@ impl Dynamics {
             momentum.add(self.body(index));
         }
         momentum
+    }
+
+    /// Cauchy stress [Pa] of each tetrahedron: xx, yy, zz, xy, yz, xz. `None` for rigid bodies and for
+    /// the linear law, which has none that turns with the elements.
+    pub fn cauchy_stress(&mut self, body: usize) -> Option<Vec<[f64; 6]>> {
+        let body = self.body_mut(body);
+        match &mut body.kind {
+            BodyKind::Elastic(elastic) => elastic.cauchy_stress(&body.positions),
+            BodyKind::Rigid { .. } => None,
+        }
     }
 
     /// Mass of each node of a body [kg]; `None` for a rigid one.

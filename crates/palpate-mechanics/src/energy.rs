@@ -22,8 +22,8 @@ impl Energy {
         self.kinetic + self.elastic + self.gravitational
     }
 
-    pub(crate) fn add(&mut self, body: &MovingBody) {
-        let BodyKind::Elastic(elastic) = &body.kind else { return };
+    pub(crate) fn add(&mut self, body: &mut MovingBody) {
+        let BodyKind::Elastic(elastic) = &mut body.kind else { return };
         self.elastic += elastic.elastic_energy(&body.positions);
         for ((&m, &x), &v) in elastic.masses().iter().zip(&body.positions).zip(&body.velocities) {
             self.kinetic += 0.5 * m * DVec3::from_array(v).length_squared();

@@ -41,26 +41,18 @@ pub enum MechanicsError {
         /// The valid range.
         expected: &'static str,
     },
-    /// A law that the time step does not compute.
-    #[error("body {body} '{name}' has law {law}: the time step computes linear bodies only")]
-    UnsupportedLaw {
-        /// Index of the body.
-        body: usize,
-        /// Its name.
-        name: String,
-        /// Its first such law.
-        law: palpate_model::Law,
-    },
-    /// Regions of different elasticity or density, which the time step does not compute.
+    /// The linear law beside another one in one body.
     #[error(
-        "body {body} '{name}' has regions of different young, poisson or density: the time step \
-         computes one for the body"
+        "body {body} '{name}' has regions of law {} and of law {}: linear regions cannot be mixed \
+         with others; use corotated", laws[0], laws[1]
     )]
-    UnsupportedRegions {
+    MixedLaws {
         /// Index of the body.
         body: usize,
         /// Its name.
         name: String,
+        /// The body's law, and one of a region.
+        laws: [palpate_model::Law; 2],
     },
     /// The stiffness matrix of a body could not be factored.
     #[error("body {body} '{name}': {source}")]

@@ -52,4 +52,7 @@ pub struct BodyState {
     /// Shape in the body's frame for which its response to contact was computed last [m]; empty if
     /// it was not.
     pub shape: Vec<Point>,
+    /// Positions [m] whose stiffness a body with a nonlinear law is solved with; empty: the rest
+    /// shape's.
+    pub stiff_shape: Vec<Point>,
 }

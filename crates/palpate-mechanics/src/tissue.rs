@@ -57,6 +57,7 @@ pub(crate) enum VolumeAveraging {
     /// In regions with nu > 0.45.
     #[default]
     Automatic,
+    #[allow(dead_code, reason = "tests compare with it")]
     /// In no region: exact element stiffness, but it locks as nu goes to 0.5.
     Never,
 }
@@ -224,6 +225,12 @@ impl Tissue {
         }
     }
 
+    /// Number of tetrahedra.
+    pub(crate) fn tetrahedron_count(&self) -> usize {
+        let members = self.elements.layout.members.as_flattened();
+        members.iter().filter(|&&member| member != PADDING).count()
+    }
+
     /// Internal forces [N] of all nodes at positions `x` [m].
     pub(crate) fn forces(&mut self, x: &[Point], forces: &mut [Point]) {
         self.find_pressures(x);
@@ -245,6 +252,7 @@ impl Tissue {
         self.energies.as_flattened().iter().sum::<f64>() + self.averaging.energy()
     }
 
+    #[allow(dead_code, reason = "the exact tangent, which tests check with")]
     /// `product = -(d forces / dx) vector` at positions `x` [m]: the exact tangent, averaged volumes
     /// included, not made positive.
     pub(crate) fn multiply(&mut self, x: &[Point], vector: &[Point], product: &mut [Point]) {
@@ -298,6 +306,7 @@ impl Tissue {
     }
 
     /// Tetrahedra that are flat or turned inside out at positions `x` [m].
+    #[allow(dead_code, reason = "callers measure volumes themselves")]
     pub(crate) fn inverted(&mut self, x: &[Point]) -> Inverted {
         let mut task = Volumes { volumes: &mut self.energies };
         ElementSet::run_geometric(&self.elements.layout.groups, x, &mut task);
@@ -359,8 +368,8 @@ impl Tissue {
     }
 }
 
-/// Von Mises stress [Pa] of a stress as [`Tissue::cauchy_stress`] orders it.
-pub(crate) fn von_mises(stress: &[f64; 6]) -> f64 {
+/// Von Mises stress [Pa] of a Cauchy stress xx, yy, zz, xy, yz, xz [Pa].
+pub fn von_mises(stress: &[f64; 6]) -> f64 {
     let [xx, yy, zz, xy, yz, xz] = *stress;
     let axial = (xx - yy).powi(2) + (yy - zz).powi(2) + (zz - xx).powi(2);
     (0.5 * axial + 3.0 * (xy * xy + yz * yz + xz * xz)).sqrt()

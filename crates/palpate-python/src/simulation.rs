@@ -213,7 +213,7 @@ impl PySimulation {
     }
 
     fn energy<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let energy = self.lock().dynamics().energy();
+        let energy = self.lock().energy();
         let row = PyDict::new(py);
         row.set_item("kinetic", energy.kinetic)?;
         row.set_item("elastic", energy.elastic)?;

@@ -6,7 +6,9 @@ use std::time::{Duration, Instant};
 
 use palpate_contact::{PenetratingNode, Scene, SceneError, SceneOptions};
 use palpate_geometry::Point;
-use palpate_mechanics::{Contact, Dynamics, DynamicsOptions, MechanicsError, State, StepStats};
+use palpate_mechanics::{
+    Contact, Dynamics, DynamicsOptions, Energy, MechanicsError, State, StepStats,
+};
 use palpate_model::Model;
 
 /// How a simulation runs.
@@ -291,7 +293,12 @@ impl Simulation {
         Ok(())
     }
 
-    /// The mechanics, for energies and momenta.
+    /// Energy of the deformable bodies.
+    pub fn energy(&mut self) -> Energy {
+        self.dynamics.energy()
+    }
+
+    /// The mechanics, for momenta and factors.
     pub fn dynamics(&self) -> &Dynamics {
         &self.dynamics
     }

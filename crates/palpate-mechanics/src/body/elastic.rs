@@ -12,23 +12,22 @@
 //! of the rest shape, in that frame, is exact. With any other law A is where a quasi-Newton method
 //! begins. A is constant, so its factor is made once.
 
+mod quasi_newton;
 mod spin;
 mod step;
 mod system;
 
-use std::sync::Arc;
-
 use glam::{DMat3, DVec3};
 use palpate_geometry::Point;
-use palpate_model::Body;
-use palpate_solver::{BlockMatrix, BlockPattern, Cholesky, FactorStats, Precision};
+use palpate_model::{Body, Law};
+use palpate_solver::{BlockMatrix, Cholesky, FactorStats, Precision};
 
-use super::element::{lame_parameters, shape_gradients, stiffness_block};
 use super::frame::best_rotation;
 use super::inertia::Inertia;
 use crate::error::MechanicsError;
+use quasi_newton::QuasiNewton;
 use step::Step;
-use system::{check_material, in_body_numbering, system_matrix};
+use system::{SystemMatrix, check_material, in_body_numbering, linear_stiffness, lumped_masses};
 
 const FIXED: u32 = u32::MAX;
 
@@ -38,7 +37,7 @@ pub(crate) struct ElasticBody {
     masses: Vec<f64>,
     /// Sum of the masses [kg].
     mass: f64,
-    stiffness: BlockMatrix,
+    elasticity: Elasticity,
     factor: Cholesky,
     /// Nodes that are not fixed, and where each node is among them.
     free_nodes: Vec<u32>,
@@ -48,6 +47,18 @@ pub(crate) struct ElasticBody {
     gravity: DVec3,
     time_step: f64,
     step: Step,
+}
+
+/// What gives the internal forces.
+#[derive(Default)]
+enum Elasticity {
+    /// Taken out while it works.
+    #[default]
+    None,
+    /// The stiffness of the rest shape, in the body's own rotating frame.
+    Linear(BlockMatrix),
+    /// Any other law, and the method that solves the step with it.
+    Nonlinear(Box<QuasiNewton>),
 }
 
 impl ElasticBody {
@@ -66,22 +77,8 @@ impl ElasticBody {
         }
         let count = nodes.len();
         let material = &body.material;
-        let lame = lame_parameters(material);
-        let mut masses = vec![0.0; count];
-        let pattern = Arc::new(BlockPattern::from_cliques(count, tetrahedra));
-        let mut stiffness = BlockMatrix::zeros(Arc::clone(&pattern));
-        for corners in tetrahedra {
-            let (volume, gradients) =
-                shape_gradients(corners.map(|node| DVec3::from_array(nodes[node as usize])));
-            for (&row, gi) in corners.iter().zip(gradients) {
-                masses[row as usize] += 0.25 * material.density * volume;
-                for (&col, gj) in corners.iter().zip(gradients) {
-                    if col <= row {
-                        stiffness.add(row, col, &stiffness_block(volume, lame, gi, gj));
-                    }
-                }
-            }
-        }
+        let inertia = (1.0 / time_step + material.mass_damping) / time_step;
+        let masses = lumped_masses(body);
         if let Some(node) = masses.iter().position(|&mass| mass <= 0.0) {
             return Err(MechanicsError::LooseNode { body: index, name: name(), node });
         }
@@ -94,20 +91,30 @@ impl ElasticBody {
         for (place, &node) in free_nodes.iter().enumerate() {
             free_index[node as usize] = place as u32;
         }
-        let system = system_matrix(&stiffness, &masses, &free_index, body, time_step);
+        let start = Inertia::new(&masses, nodes, &vec![[0.0; 3]; count]);
+        let rest: Vec<DVec3> =
+            nodes.iter().map(|&node| DVec3::from_array(node) - start.center).collect();
+        let (elasticity, system) = if material.law == Law::Linear {
+            let stiffness = linear_stiffness(body);
+            let mut system = SystemMatrix::new(&stiffness, &free_index);
+            system.fill(&stiffness, &masses, inertia, 1.0 + material.damping / time_step);
+            (Elasticity::Linear(stiffness), system.into_matrix())
+        } else {
+            let mut method = QuasiNewton::new(body, &free_index);
+            let system = method.system_at_rest(&rest, &masses, inertia, time_step).clone();
+            (Elasticity::Nonlinear(Box::new(method)), system)
+        };
         let factor = Cholesky::with_precision(&system, Precision::Single).map_err(|source| {
             let source = in_body_numbering(source, &free_nodes);
             MechanicsError::Factor { body: index, name: name(), source }
         })?;
-        let start = Inertia::new(&masses, nodes, &vec![[0.0; 3]; count]);
-        let rest = nodes.iter().map(|&node| DVec3::from_array(node) - start.center).collect();
         let workspace = factor.workspace();
         let step = Step::new(start, count, free_nodes.len(), workspace);
         Ok(Self {
             rest,
             mass: masses.iter().sum(),
             masses,
-            stiffness,
+            elasticity,
             factor,
             free_nodes,
             free_index,
@@ -121,6 +128,10 @@ impl ElasticBody {
 
     pub(crate) fn is_free(&self, node: usize) -> bool {
         self.free_index[node] != FIXED
+    }
+
+    fn is_linear(&self) -> bool {
+        matches!(self.elasticity, Elasticity::Linear(_))
     }
 
     fn is_unattached(&self) -> bool {
@@ -204,29 +215,59 @@ impl ElasticBody {
         }
     }
 
+    /// 1/dt² + alpha/dt: force [N] per mass and displacement.
+    fn inertia(&self) -> f64 {
+        (1.0 / self.time_step + self.mass_damping) / self.time_step
+    }
+
     /// Displacement [m] of a step under unit force per unit mass.
     fn gain(&self) -> f64 {
         self.time_step * self.time_step / (1.0 + self.mass_damping * self.time_step)
     }
 
-    /// Elastic energy [J] at positions `x`.
-    pub(crate) fn elastic_energy(&self, x: &[Point]) -> f64 {
-        let total: f64 = self.masses.iter().sum();
+    /// Cauchy stress of each tetrahedron at positions `x` [Pa]; `None` for the linear law.
+    pub(crate) fn cauchy_stress(&mut self, x: &[Point]) -> Option<Vec<[f64; 6]>> {
+        match &mut self.elasticity {
+            Elasticity::Nonlinear(method) => {
+                let mut stress = vec![[0.0; 6]; method.tissue.tetrahedron_count()];
+                method.tissue.cauchy_stress(x, &mut stress);
+                Some(stress)
+            }
+            _ => None,
+        }
+    }
+
+    fn center_of(&self, x: &[Point]) -> DVec3 {
         let weighted = self.masses.iter().zip(x).map(|(&m, &x)| m * DVec3::from_array(x));
-        let center = weighted.sum::<DVec3>() / total;
+        weighted.sum::<DVec3>() / self.mass
+    }
+
+    /// Frame of positions `x`.
+    fn frame_of(&self, x: &[Point]) -> DMat3 {
+        let center = self.center_of(x);
         let mut fit = DMat3::ZERO;
         for ((&m, &x), rest) in self.masses.iter().zip(x).zip(&self.rest) {
             let r = m * (DVec3::from_array(x) - center);
             fit += DMat3::from_cols(rest.x * r, rest.y * r, rest.z * r);
         }
-        let to_frame = best_rotation(fit).transpose();
+        best_rotation(fit)
+    }
+
+    /// Elastic energy [J] at positions `x`.
+    pub(crate) fn elastic_energy(&mut self, x: &[Point]) -> f64 {
+        let (center, to_frame) = (self.center_of(x), self.frame_of(x).transpose());
+        let stiffness = match &mut self.elasticity {
+            Elasticity::Linear(stiffness) => stiffness,
+            Elasticity::Nonlinear(method) => return method.tissue.energy(x),
+            Elasticity::None => unreachable!("only within a step"),
+        };
         let strain: Vec<[f64; 3]> = x
             .iter()
             .zip(&self.rest)
             .map(|(&x, &rest)| (to_frame * (DVec3::from_array(x) - center) - rest).to_array())
             .collect();
         let mut product = vec![[0.0; 3]; strain.len()];
-        self.stiffness.multiply(&strain, &mut product);
+        stiffness.multiply(&strain, &mut product);
         let pairs = strain.as_flattened().iter().zip(product.as_flattened());
         0.5 * pairs.map(|(u, f)| u * f).sum::<f64>()
     }

@@ -27,6 +27,7 @@ pub(crate) struct ComplianceCache {
     limit: usize,
     /// Surface nodes before this one have been solved ahead.
     ahead: usize,
+    version: u64,
 }
 
 #[derive(Clone, Debug)]
@@ -53,6 +54,19 @@ impl ComplianceCache {
     #[cfg(test)]
     pub(super) fn set_limit(&mut self, bytes: usize) {
         self.limit = bytes;
+    }
+
+    /// Gives up all columns: the matrix has changed.
+    pub(crate) fn clear(&mut self) {
+        self.slot_of.fill(NONE);
+        self.slots.clear();
+        (self.size, self.ahead) = (0, 0);
+        self.version += 1;
+    }
+
+    /// Counts how often the columns were given up.
+    pub(crate) fn version(&self) -> u64 {
+        self.version
     }
 
     /// Makes the columns of `nodes` available; returns how many had to be solved.

@@ -13,6 +13,8 @@ const SPARE: f64 = 0.5;
 /// their slots from step to step, so that only new ones are gathered.
 #[derive(Debug, Default)]
 pub(super) struct NodeCompliance {
+    /// That of the columns that were gathered.
+    version: u64,
     slot_of: Vec<u32>,
     /// Slot -> node; [`NONE`] where there is none.
     nodes: Vec<u32>,
@@ -28,7 +30,9 @@ impl NodeCompliance {
     pub(super) fn gather(&mut self, cache: &ComplianceCache, node_count: usize, nodes: &[u32]) {
         self.slot_of.resize(node_count, NONE);
         let limit = nodes.len() + (SPARE * nodes.len() as f64) as usize;
-        if nodes.len() > self.stride || self.stride > limit.next_multiple_of(LANES) {
+        let outdated = self.version != cache.version();
+        self.version = cache.version();
+        if outdated || nodes.len() > self.stride || self.stride > limit.next_multiple_of(LANES) {
             self.resize(nodes.len());
         }
         self.is_used.clear();
@@ -111,7 +115,7 @@ impl NodeCompliance {
             }
         }
         let is_used = vec![true; count];
-        Self { slot_of: nodes.clone(), nodes, is_used, stride, values }
+        Self { version: 0, slot_of: nodes.clone(), nodes, is_used, stride, values }
     }
 
     /// Slot of a node that was gathered.

@@ -1,14 +1,25 @@
 //! Bodies that touch.
 
+use palpate_model::Law;
+
 use crate::world::{GRAVITY, World, box_mesh, difference, floor, length, model, rigid, soft, sum};
 
 const DT: f64 = 1.0 / 60.0;
 
 #[test]
 fn colliding_bodies_keep_their_momentum() {
+    for law in [Law::Linear, Law::Corotated, Law::NeoHookean] {
+        collide(law);
+    }
+}
+
+fn collide(law: Law) {
     let left = box_mesh([3, 3, 3], [0.1; 3], |x| x);
     let right = box_mesh([4, 3, 2], [0.1; 3], |[x, y, z]| [x + 0.12, y + 0.031, z + 0.023]);
     let mut bodies = vec![soft("left", &left, 2e4, 0.002), soft("right", &right, 1e4, 0.002)];
+    for body in &mut bodies {
+        body.material.law = law;
+    }
     bodies[0].initial_velocity = [1.0, 0.0, 0.0];
     let mut world = World::new(&model(bodies, 0.0), DT, 1);
     let start = world.dynamics.momentum();
@@ -20,7 +31,7 @@ fn colliding_bodies_keep_their_momentum() {
         let now = world.dynamics.momentum();
         let linear = length(difference(now.linear, start.linear)) / length(start.linear);
         let angular = length(difference(now.angular, start.angular)) / length(start.angular);
-        assert!(linear < 1e-12 && angular < 1e-11, "{linear:e} {angular:e}");
+        assert!(linear < 1e-12 && angular < 1e-11, "{law}: {linear:e} {angular:e}");
         assert!(world.dynamics.energy().total() < 1.001 * energy);
         let sum = [0, 1].map(|body| world.contact_sum(body));
         assert!(

@@ -7,4 +7,5 @@ mod errors;
 mod free_motion;
 mod friction;
 mod impact;
+mod nonlinear;
 mod world;

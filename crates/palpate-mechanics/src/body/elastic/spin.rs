@@ -76,16 +76,16 @@ impl ElasticBody {
     }
 
     /// The response to contact turns the body by an amount of second order too much; positions stay,
-    /// or surfaces would overlap, and the velocities are put right where that slows the body. Where it
-    /// would not, the positions' own spin stays: a body at rest under its weight, which contact turns
-    /// back in every step, would otherwise keep a velocity that moves nothing.
+    /// or surfaces would overlap, and the velocities are put right. With the linear law, whose internal
+    /// forces have a torque, only where that slows the body: one at rest under its weight, which
+    /// contact turns back in every step, would otherwise keep a velocity that moves nothing.
     pub(super) fn correct_spin(&self, target: DVec3, touched: bool, x: &[Point], v: &mut [Point]) {
         let now = Inertia::new(&self.masses, x, v);
         let inverse = now.tensor.inverse();
         let omega = inverse * (target - now.spin);
         let energy = |spin: DVec3| spin.dot(inverse * spin);
         let gains_energy = energy(target) > (1.0 + ENERGY_SLACK) * energy(now.spin);
-        if !omega.is_finite() || (touched && gains_energy) {
+        if !omega.is_finite() || (touched && gains_energy && self.is_linear()) {
             return;
         }
         for (v, &x) in v.iter_mut().zip(x) {

@@ -3,12 +3,13 @@
 
 use glam::{DMat3, DVec3};
 use palpate_geometry::Point;
-use palpate_solver::SolveWorkspace;
+use palpate_solver::{BlockMatrix, SolveWorkspace};
 
-use super::{ElasticBody, FIXED};
+use super::{ElasticBody, Elasticity, FIXED};
 use crate::body::frame::best_rotation;
 use crate::body::inertia::{Inertia, RunningInertia};
 use crate::body::turning::{Rotations, Turning};
+use crate::state::BodyState;
 
 /// Part of the body's radius by which its shape may change before its response is computed again.
 const SHAPE_TOLERANCE: f64 = 1e-3;
@@ -33,6 +34,7 @@ pub(super) struct Step {
     pub(super) columns: Vec<[f64; 9]>,
     /// Rotations of the predicted positions of an unattached body.
     rotations: Rotations,
+    turns: bool,
     /// How contact forces turn the body: known once it has been touched in about this shape.
     pub(super) turning: Turning,
     pub(super) turning_known: bool,
@@ -61,6 +63,7 @@ impl Step {
             response: vec![[0.0; 3]; free_count],
             columns: vec![[0.0; 9]; free_count],
             rotations: Rotations::default(),
+            turns: false,
             turning: Turning::default(),
             turning_known: false,
             touched: false,
@@ -91,21 +94,38 @@ impl ElasticBody {
             }
         }
         self.step.frame = self.fit_frame();
+        let mut elasticity = std::mem::take(&mut self.elasticity);
         self.find_rotations();
-        self.internal_forces();
-        self.load_elastic(forces);
+        self.find_deformation();
         self.step.touched = contact.is_some();
         self.step.response.fill([0.0; 3]);
+        if contact.is_some() {
+            self.prepare_turning();
+        }
+        match &mut elasticity {
+            Elasticity::Linear(stiffness) => self.correct_linear(stiffness, x, forces, contact),
+            Elasticity::Nonlinear(method) => self.correct(method, x, forces, contact),
+            Elasticity::None => {}
+        }
+        self.elasticity = elasticity;
+    }
+
+    /// Finds the correction with the linear law, and the response to the expected contact forces.
+    fn correct_linear(
+        &mut self,
+        stiffness: &BlockMatrix,
+        x: &[Point],
+        forces: &[Point],
+        contact: Option<&[Point]>,
+    ) {
+        self.load_elastic(stiffness, forces);
         let mut correction = std::mem::take(&mut self.step.correction);
         let mut expected = std::mem::take(&mut self.step.expected);
         if let Some(contact) = contact {
-            self.prepare_turning();
             self.load(&mut expected, contact);
-            let torque = self.turning().map(|_| self.balance(&mut expected));
+            let torque = self.balance(&mut expected);
             self.solve(&mut correction, Some(&mut expected));
-            if let Some(torque) = torque {
-                self.step.rotations.turn(&self.masses, torque, &mut expected);
-            }
+            self.turn(torque, &mut expected);
         } else {
             expected.fill([0.0; 3]);
             self.solve(&mut correction, None);
@@ -116,21 +136,37 @@ impl ElasticBody {
         }
     }
 
-    /// Writes all forces but contact on the free nodes, in the frame, to `correction`.
-    fn load_elastic(&mut self, forces: &[Point]) {
-        let to_frame = self.step.frame.transpose();
-        for (load, &node) in self.step.correction.iter_mut().zip(&self.free_nodes) {
+    /// Writes all forces but contact on the free nodes, in the frame, to `correction`: elastic and
+    /// damping forces at the predicted state, and external ones.
+    ///
+    /// The frame turns with the body, so the gradient of the energy has one more term; it is what
+    /// makes the torque of the internal forces vanish. Taken explicitly it is unstable when a body
+    /// folds, so it is left out here, and [`ElasticBody::remove_torque`] does its work on the result.
+    /// Where nodes are fixed, they take that torque: it is of second order in the strain.
+    fn load_elastic(&mut self, stiffness: &BlockMatrix, forces: &[Point]) {
+        let (center, to_frame) = (self.predicted_center(), self.step.frame.transpose());
+        for node in 0..self.masses.len() {
+            let r = to_frame * (self.step.positions[node] - center);
+            let strain = r - self.rest[node] + self.damping * self.step.deformation[node];
+            self.step.strain[node] = strain.to_array();
+        }
+        stiffness.multiply(&self.step.strain, &mut self.step.force);
+        for (place, &node) in self.free_nodes.iter().enumerate() {
             let node = node as usize;
-            let mass = self.masses[node];
-            let external = DVec3::from_array(forces[node])
-                + mass * (self.gravity - self.mass_damping * self.step.velocities[node]);
-            let force = DVec3::from_array(self.step.force[node]) + to_frame * external;
-            *load = force.to_array();
+            let internal = DVec3::from_array(self.step.force[node]);
+            let load = to_frame * self.external(forces, node) - internal;
+            self.step.correction[place] = load.to_array();
         }
     }
 
+    /// External forces on a node, damping of the predicted motion included [N].
+    pub(super) fn external(&self, forces: &[Point], node: usize) -> DVec3 {
+        let braking = self.mass_damping * self.step.velocities[node];
+        DVec3::from_array(forces[node]) + self.masses[node] * (self.gravity - braking)
+    }
+
     /// Frame of the predicted positions.
-    fn fit_frame(&mut self) -> DMat3 {
+    fn fit_frame(&self) -> DMat3 {
         let center = self.predicted_center();
         let mut fit = DMat3::ZERO;
         for ((&m, &x), &rest) in self.masses.iter().zip(&self.step.positions).zip(&self.rest) {
@@ -150,15 +186,9 @@ impl ElasticBody {
         center / total
     }
 
-    /// Elastic and damping forces in the frame at the predicted state.
-    ///
-    /// The frame turns with the body, so the gradient of the energy has one more term; it is what
-    /// makes the torque of the internal forces vanish. Taken explicitly it is unstable when a body
-    /// folds, so it is left out here, and [`ElasticBody::remove_torque`] does its work on the result.
-    /// Where nodes are fixed, they take that torque: it is of second order in the strain.
-    fn internal_forces(&mut self) {
+    /// Velocity of the predicted body in the frame, without its rotation.
+    fn find_deformation(&mut self) {
         let to_frame = self.step.frame.transpose();
-        // Rotation of the predicted body, to be left out of the damping.
         let mut sum = RunningInertia::default();
         for (node, &m) in self.masses.iter().enumerate() {
             sum.add(m, self.step.positions[node], self.step.velocities[node]);
@@ -167,14 +197,8 @@ impl ElasticBody {
         let omega = now.tensor.inverse() * now.spin;
         for node in 0..self.masses.len() {
             let r = self.step.positions[node] - now.center;
-            let v = to_frame * (self.step.velocities[node] - now.velocity - omega.cross(r));
-            let r = to_frame * r;
-            self.step.deformation[node] = v;
-            self.step.strain[node] = (r - self.rest[node] + self.damping * v).to_array();
-        }
-        self.stiffness.multiply(&self.step.strain, &mut self.step.force);
-        for force in &mut self.step.force {
-            *force = force.map(|f| -f);
+            let v = self.step.velocities[node] - now.velocity - omega.cross(r);
+            self.step.deformation[node] = to_frame * v;
         }
     }
 
@@ -230,12 +254,19 @@ impl ElasticBody {
         arms.iter().map(DVec3::to_array).collect()
     }
 
-    /// Goes back to a shape given by [`ElasticBody::shape`].
-    pub(in crate::body) fn set_shape(&mut self, shape: &[Point]) {
+    /// Goes back to what the response was computed for; true if A has changed.
+    pub(in crate::body) fn set_shape(&mut self, saved: &BodyState) -> bool {
+        let mut elasticity = std::mem::take(&mut self.elasticity);
+        let changed = match &mut elasticity {
+            Elasticity::Nonlinear(method) => self.take_stiffness(method, &saved.stiff_shape),
+            _ => false,
+        };
+        self.elasticity = elasticity;
         self.step.turning_known = false;
-        if !shape.is_empty() {
-            self.turn_by(shape.iter().map(|&arm| DVec3::from_array(arm)));
+        if !saved.shape.is_empty() {
+            self.turn_by(saved.shape.iter().map(|&arm| DVec3::from_array(arm)));
         }
+        changed
     }
 
     /// Computes the response to `change`, the contact forces less those that were expected [N]; `None`
@@ -248,16 +279,26 @@ impl ElasticBody {
         };
         let mut response = std::mem::take(&mut self.step.response);
         self.load(&mut response, change);
-        let torque = self.turning().map(|_| self.balance(&mut response));
-        self.solve(&mut response, None);
-        if let Some(torque) = torque {
-            self.step.rotations.turn(&self.masses, torque, &mut response);
-        }
+        self.respond_to(&mut response);
         self.step.response = response;
     }
 
+    /// Turns loads on the free nodes, in the frame, into displacements; torques turn an unattached body
+    /// by what its inertia says.
+    pub(super) fn respond_to(&mut self, loads: &mut [[f64; 3]]) {
+        let torque = self.balance(loads);
+        self.solve(loads, None);
+        self.turn(torque, loads);
+    }
+
     fn balance(&self, loads: &mut [[f64; 3]]) -> DVec3 {
-        self.step.rotations.balance(&self.masses, loads)
+        if self.step.turns { self.step.rotations.balance(&self.masses, loads) } else { DVec3::ZERO }
+    }
+
+    fn turn(&self, torque: DVec3, response: &mut [[f64; 3]]) {
+        if self.step.turns {
+            self.step.rotations.turn(&self.masses, torque, response);
+        }
     }
 
     /// Writes forces on the free nodes, turned into the frame, to `loads`.

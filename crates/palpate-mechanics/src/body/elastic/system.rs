@@ -2,49 +2,106 @@
 
 use std::sync::Arc;
 
+use glam::DVec3;
+use palpate_geometry::Point;
 use palpate_model::Body;
 use palpate_solver::{BlockMatrix, BlockPattern, FactorError};
 
 use super::FIXED;
+use crate::body::element::{lame_parameters, shape_gradients, stiffness_block};
 use crate::error::MechanicsError;
-use crate::materials::check_supported;
+use crate::materials::check_laws;
 
-/// A over the free nodes.
-pub(super) fn system_matrix(
-    stiffness: &BlockMatrix,
-    masses: &[f64],
-    free_index: &[u32],
-    body: &Body,
-    time_step: f64,
-) -> BlockMatrix {
-    let factor = 1.0 + body.material.damping / time_step;
-    let mut edges: Vec<[u32; 2]> = Vec::new();
-    let pattern = stiffness.pattern();
-    let mut kept = Vec::new();
-    for col in 0..masses.len() as u32 {
-        let first = free_index[col as usize];
-        for &row in pattern.column(col as usize) {
-            let second = free_index[row as usize];
-            if first != FIXED && second != FIXED {
-                edges.push([first, second]);
-                kept.push((row, col));
+/// A quarter of the mass of each tetrahedron at its nodes [kg].
+pub(super) fn lumped_masses(body: &Body) -> Vec<f64> {
+    let (nodes, tetrahedra) = (body.mesh.nodes(), body.mesh.tetrahedra());
+    let mut masses = vec![0.0; nodes.len()];
+    for (corners, material) in tetrahedra.iter().zip(body.materials()) {
+        let (volume, _) = shape_gradients(corners.map(|node| at(nodes, node)));
+        for &node in corners {
+            masses[node as usize] += 0.25 * material.density * volume;
+        }
+    }
+    masses
+}
+
+/// K of linear elasticity over all nodes.
+pub(super) fn linear_stiffness(body: &Body) -> BlockMatrix {
+    let (nodes, tetrahedra) = (body.mesh.nodes(), body.mesh.tetrahedra());
+    let pattern = Arc::new(BlockPattern::from_cliques(nodes.len(), tetrahedra));
+    let mut stiffness = BlockMatrix::zeros(pattern);
+    for (corners, material) in tetrahedra.iter().zip(body.materials()) {
+        let lame = lame_parameters(material);
+        let (volume, gradients) = shape_gradients(corners.map(|node| at(nodes, node)));
+        for (&row, gi) in corners.iter().zip(gradients) {
+            for (&col, gj) in corners.iter().zip(gradients) {
+                if col <= row {
+                    stiffness.add(row, col, &stiffness_block(volume, lame, gi, gj));
+                }
             }
         }
     }
-    let free_count = free_index.iter().filter(|&&place| place != FIXED).count();
-    let mut system = BlockMatrix::zeros(Arc::new(BlockPattern::from_cliques(free_count, &edges)));
-    let inertia = 1.0 / (time_step * time_step) + body.material.mass_damping / time_step;
-    for ([col, row], (full_row, full_col)) in edges.into_iter().zip(kept) {
-        let index = pattern.find(full_row, full_col).expect("taken from the pattern");
-        let mut block = stiffness.blocks()[index].map(|line| line.map(|value| factor * value));
-        if row == col {
-            for (k, line) in block.iter_mut().enumerate() {
-                line[k] += inertia * masses[full_row as usize];
+    stiffness
+}
+
+fn at(nodes: &[Point], node: u32) -> DVec3 {
+    DVec3::from_array(nodes[node as usize])
+}
+
+/// The matrix `inertia M + factor K` over the free nodes.
+pub(super) struct SystemMatrix {
+    matrix: BlockMatrix,
+    /// For each block of the matrix: the block of K, and the node of a diagonal one.
+    sources: Vec<(u32, Option<u32>)>,
+}
+
+impl SystemMatrix {
+    pub(super) fn new(stiffness: &BlockMatrix, free_index: &[u32]) -> Self {
+        let pattern = stiffness.pattern();
+        let mut entries: Vec<([u32; 2], u32, Option<u32>)> = Vec::new();
+        for col in 0..free_index.len() as u32 {
+            for &row in pattern.column(col as usize) {
+                let places = [free_index[col as usize], free_index[row as usize]];
+                if !places.contains(&FIXED) {
+                    let source = pattern.find(row, col).expect("taken from the pattern") as u32;
+                    entries.push((places, source, (row == col).then_some(col)));
+                }
             }
         }
-        system.add(row, col, &block);
+        let edges: Vec<[u32; 2]> = entries.iter().map(|entry| entry.0).collect();
+        let free_count = free_index.iter().filter(|&&place| place != FIXED).count();
+        let matrix = BlockMatrix::zeros(Arc::new(BlockPattern::from_cliques(free_count, &edges)));
+        // Free nodes keep their order, so that no block is transposed.
+        let mut sources = vec![(0, None); matrix.blocks().len()];
+        for ([col, row], source, node) in entries {
+            let place = matrix.pattern().find(row, col).expect("joined above");
+            sources[place] = (source, node);
+        }
+        Self { matrix, sources }
     }
-    system
+
+    pub(super) fn into_matrix(self) -> BlockMatrix {
+        self.matrix
+    }
+
+    /// Fills the matrix.
+    pub(super) fn fill(
+        &mut self,
+        stiffness: &BlockMatrix,
+        masses: &[f64],
+        inertia: f64,
+        factor: f64,
+    ) -> &BlockMatrix {
+        for (block, &(source, node)) in self.matrix.blocks_mut().iter_mut().zip(&self.sources) {
+            *block = stiffness.blocks()[source as usize].map(|row| row.map(|value| factor * value));
+            if let Some(node) = node {
+                for (k, row) in block.iter_mut().enumerate() {
+                    row[k] += inertia * masses[node as usize];
+                }
+            }
+        }
+        &self.matrix
+    }
 }
 
 pub(super) fn in_body_numbering(error: FactorError, free_nodes: &[u32]) -> FactorError {
@@ -58,25 +115,42 @@ pub(super) fn in_body_numbering(error: FactorError, free_nodes: &[u32]) -> Facto
 }
 
 pub(super) fn check_material(index: usize, body: &Body) -> Result<(), MechanicsError> {
-    check_supported(index, body)?;
-    let m = &body.material;
-    let finite = |value: f64, ok: bool| value.is_finite() && ok;
-    let checks = [
-        ("young", m.young, finite(m.young, m.young > 0.0), "a positive number of Pa"),
-        ("poisson", m.poisson, m.poisson > -1.0 && m.poisson < 0.5, "-1 < poisson < 0.5"),
-        ("density", m.density, finite(m.density, m.density > 0.0), "a positive number of kg/m³"),
-        ("damping", m.damping, finite(m.damping, m.damping >= 0.0), "a number of s, not negative"),
-        (
-            "mass damping",
-            m.mass_damping,
-            finite(m.mass_damping, m.mass_damping >= 0.0),
-            "a number of 1/s, not negative",
-        ),
-    ];
-    for (what, value, ok, expected) in checks {
-        if !ok {
-            let name = body.name.clone();
-            return Err(MechanicsError::BadParameter { body: index, name, what, value, expected });
+    check_laws(index, body)?;
+    for m in std::iter::once(&body.material).chain(body.regions.iter().map(|(_, m)| m)) {
+        let finite = |value: f64, ok: bool| value.is_finite() && ok;
+        let checks = [
+            ("young", m.young, finite(m.young, m.young > 0.0), "a positive number of Pa"),
+            ("poisson", m.poisson, m.poisson > -1.0 && m.poisson < 0.5, "-1 < poisson < 0.5"),
+            (
+                "density",
+                m.density,
+                finite(m.density, m.density > 0.0),
+                "a positive number of kg/m³",
+            ),
+            (
+                "damping",
+                m.damping,
+                finite(m.damping, m.damping >= 0.0),
+                "a number of s, not negative",
+            ),
+            (
+                "mass damping",
+                m.mass_damping,
+                finite(m.mass_damping, m.mass_damping >= 0.0),
+                "a number of 1/s, not negative",
+            ),
+        ];
+        for (what, value, ok, expected) in checks {
+            if !ok {
+                let name = body.name.clone();
+                return Err(MechanicsError::BadParameter {
+                    body: index,
+                    name,
+                    what,
+                    value,
+                    expected,
+                });
+            }
         }
     }
     let velocity = body.initial_velocity.iter().copied().find(|value| !value.is_finite());

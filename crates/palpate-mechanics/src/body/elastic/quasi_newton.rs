@@ -1,0 +1,331 @@
+//! The step with a nonlinear law: a quasi-Newton method that begins with the matrix of the rest shape.
+//!
+//! Limited-memory BFGS (Nocedal 1980) around a factored constant matrix, as Liu, Bouaziz and Kavan
+//! (2017) do for hyperelastic bodies: an iteration costs the internal forces once and a solve, and no
+//! matrix is assembled or factored in a step.
+
+use std::sync::Arc;
+
+use glam::{DMat3, DVec3};
+use palpate_geometry::Point;
+use palpate_model::Body;
+use palpate_solver::BlockMatrix;
+
+use super::system::SystemMatrix;
+use super::{ElasticBody, Elasticity, FIXED};
+use crate::materials::tissue_of;
+use crate::tissue::{Tissue, VolumeAveraging};
+
+/// Steps whose change of the forces is remembered.
+const MEMORY: usize = 5;
+/// A step ends when no node moves by more than this part of the mean edge in an iteration.
+const TOLERANCE: f64 = 3e-4;
+/// Most iterations of a step.
+const MAX_ITERATIONS: usize = 10;
+/// Iterations of a step after which A is made anew.
+const SLOW: u32 = 6;
+/// The same when a node has moved by more than this part of the body's radius since, apart from the
+/// body's motion as a whole: slow processes need few iterations in each of very many steps.
+const DEFORMED: f64 = 0.1;
+/// Farthest that a node moves in an iteration, in mean edges.
+const LONGEST_MOVE: f64 = 1.0;
+
+/// A law and what the method remembers within a step.
+pub(super) struct QuasiNewton {
+    pub(super) tissue: Tissue,
+    mean_edge: f64,
+    /// Trial positions and the internal forces there.
+    x: Vec<Point>,
+    forces: Vec<Point>,
+    /// Forces left over on the free nodes, in the frame.
+    residual: Vec<[f64; 3]>,
+    /// The same before the last move; then the next move.
+    scratch: Vec<[f64; 3]>,
+    pairs: Vec<Pair>,
+    /// Stiffness, and A made of it, when the shape has changed.
+    stiffness: BlockMatrix,
+    system: SystemMatrix,
+    /// Where the stiffness was taken [m]; empty: at rest.
+    stiff_shape: Vec<Point>,
+    /// Iterations of the last step.
+    iterations: u32,
+}
+
+/// A move s of the free nodes and the change y of the residual, its sign turned.
+#[derive(Default)]
+struct Pair {
+    s: Vec<[f64; 3]>,
+    y: Vec<[f64; 3]>,
+    /// 1 / (s . y)
+    rho: f64,
+    alpha: f64,
+}
+
+impl QuasiNewton {
+    pub(super) fn new(body: &Body, free_index: &[u32]) -> Self {
+        let tissue = tissue_of(body, VolumeAveraging::Automatic);
+        let stiffness = BlockMatrix::zeros(Arc::clone(tissue.pattern()));
+        let system = SystemMatrix::new(&stiffness, free_index);
+        let node_count = free_index.len();
+        let free_count = free_index.iter().filter(|&&place| place != FIXED).count();
+        let zero = || vec![[0.0; 3]; free_count];
+        let pair = |_| Pair { s: zero(), y: zero(), rho: 0.0, alpha: 0.0 };
+        Self {
+            tissue,
+            mean_edge: body.mesh.mean_surface_edge(),
+            x: vec![[0.0; 3]; node_count],
+            forces: vec![[0.0; 3]; node_count],
+            residual: zero(),
+            scratch: zero(),
+            pairs: (0..MEMORY).map(pair).collect(),
+            stiffness,
+            system,
+            stiff_shape: Vec::with_capacity(node_count),
+            iterations: 0,
+        }
+    }
+
+    /// A of the rest shape.
+    pub(super) fn system_at_rest(
+        &mut self,
+        rest: &[DVec3],
+        masses: &[f64],
+        inertia: f64,
+        time_step: f64,
+    ) -> &BlockMatrix {
+        for (x, rest) in self.x.iter_mut().zip(rest) {
+            *x = rest.to_array();
+        }
+        self.system_at_trial(DMat3::IDENTITY, masses, inertia, time_step)
+    }
+
+    /// A at the trial positions, whose frame is `frame`.
+    fn system_at_trial(
+        &mut self,
+        frame: DMat3,
+        masses: &[f64],
+        inertia: f64,
+        time_step: f64,
+    ) -> &BlockMatrix {
+        self.tissue.begin_step(&self.x, time_step);
+        self.stiffness.blocks_mut().fill([[0.0; 3]; 3]);
+        self.tissue.add_stiffness(&self.x, &mut self.stiffness);
+        if frame != DMat3::IDENTITY {
+            let to_frame = frame.transpose();
+            for block in self.stiffness.blocks_mut() {
+                // Row by row here, column by column there.
+                let turned = to_frame * DMat3::from_cols_array_2d(block).transpose() * frame;
+                *block = turned.transpose().to_cols_array_2d();
+            }
+        }
+        self.system.fill(&self.stiffness, masses, inertia, 1.0)
+    }
+}
+
+impl ElasticBody {
+    /// The positions whose stiffness A is made of; empty for those of the rest shape.
+    pub(in crate::body) fn stiff_shape(&self) -> &[Point] {
+        match &self.elasticity {
+            Elasticity::Nonlinear(method) => &method.stiff_shape,
+            _ => &[],
+        }
+    }
+
+    /// Iterations of the step; 0 with the linear law.
+    pub(in crate::body) fn newton_iterations(&self) -> u32 {
+        match &self.elasticity {
+            Elasticity::Nonlinear(method) => method.iterations,
+            _ => 0,
+        }
+    }
+
+    /// Makes A of the stiffness at positions `x` if the step that ends there took many iterations or the
+    /// shape has changed much: with the stiffness of a very different shape the contact forces, which A
+    /// alone tells how to choose, would be wrong as well. True if A has changed.
+    pub(in crate::body) fn refresh_if_slow(&mut self, x: &[Point]) -> bool {
+        match std::mem::take(&mut self.elasticity) {
+            Elasticity::Nonlinear(mut method) => {
+                let due = method.iterations >= SLOW || self.is_deformed(&method, x);
+                let changed = due && self.take_stiffness(&mut method, x);
+                self.elasticity = Elasticity::Nonlinear(method);
+                changed
+            }
+            other => {
+                self.elasticity = other;
+                false
+            }
+        }
+    }
+
+    /// Whether positions `x` differ much in shape from those that A is made of.
+    fn is_deformed(&self, method: &QuasiNewton, x: &[Point]) -> bool {
+        let arms = |x: &[Point]| (self.center_of(x), self.frame_of(x).transpose());
+        let (center, to_frame) = arms(x);
+        let stiff = &method.stiff_shape;
+        let (stiff_center, to_stiff) = arms(if stiff.is_empty() { x } else { stiff });
+        let (mut change, mut radius) = (0.0_f64, 0.0_f64);
+        for (node, (&x, &rest)) in x.iter().zip(&self.rest).enumerate() {
+            let arm = to_frame * (DVec3::from_array(x) - center);
+            let other = match stiff.get(node) {
+                Some(&stiff) => to_stiff * (DVec3::from_array(stiff) - stiff_center),
+                None => rest,
+            };
+            change = change.max((arm - other).length_squared());
+            radius = radius.max(arm.length_squared());
+        }
+        change > DEFORMED * DEFORMED * radius
+    }
+
+    /// Makes A of the stiffness at `shape`, or of that at rest if it is empty; true if A has changed.
+    /// Where the matrix cannot be factored, as when a body is about to be lost, that at rest is taken.
+    pub(super) fn take_stiffness(&mut self, method: &mut QuasiNewton, shape: &[Point]) -> bool {
+        if method.stiff_shape == shape {
+            return false;
+        }
+        self.step.turning_known = false;
+        method.stiff_shape.clear();
+        let (inertia, time_step) = (self.inertia(), self.time_step);
+        if !shape.is_empty() {
+            method.x.copy_from_slice(shape);
+            let frame = self.frame_of(shape);
+            let system = method.system_at_trial(frame, &self.masses, inertia, time_step);
+            if self.factor.refactor(system).is_ok() {
+                method.stiff_shape.extend_from_slice(shape);
+                return true;
+            }
+        }
+        let system = method.system_at_rest(&self.rest, &self.masses, inertia, time_step);
+        let factored = self.factor.refactor(system);
+        debug_assert!(factored.is_ok(), "factored when the body was made");
+        true
+    }
+
+    /// Finds the correction of the prediction under all forces.
+    pub(super) fn correct(
+        &mut self,
+        method: &mut QuasiNewton,
+        x: &[Point],
+        forces: &[Point],
+        contact: Option<&[Point]>,
+    ) {
+        method.tissue.begin_step(x, self.time_step);
+        self.step.correction.fill([0.0; 3]);
+        let mut known = 0;
+        for iteration in 0..MAX_ITERATIONS {
+            method.iterations = iteration as u32 + 1;
+            std::mem::swap(&mut method.scratch, &mut method.residual);
+            self.find_residual(method, forces, contact);
+            if iteration > 0 {
+                // The move of the last iteration waits in the next pair.
+                let QuasiNewton { pairs, residual, scratch, .. } = &mut *method;
+                let pair = &mut pairs[known];
+                for ((y, r), before) in pair.y.iter_mut().zip(&*residual).zip(&*scratch) {
+                    *y = std::array::from_fn(|k| before[k] - r[k]);
+                }
+                let product = dot(&pair.s, &pair.y);
+                if product > 0.0 {
+                    pair.rho = product.recip();
+                    known += 1;
+                    if known == MEMORY {
+                        pairs.rotate_left(1);
+                        known -= 1;
+                    }
+                }
+            }
+            let longest = self.next_move(method, known);
+            let s = &mut method.pairs[known].s;
+            let limit = LONGEST_MOVE * method.mean_edge;
+            let scale = if longest > limit { limit / longest } else { 1.0 };
+            for ((d, s), z) in self.step.correction.iter_mut().zip(s).zip(&method.scratch) {
+                *s = z.map(|z| scale * z);
+                *d = std::array::from_fn(|k| d[k] + s[k]);
+            }
+            if longest <= TOLERANCE * method.mean_edge {
+                break;
+            }
+        }
+        if self.is_unattached() {
+            self.put_momentum_right(x, forces, contact);
+        }
+    }
+
+    /// Moves and turns the body as a whole so that only external and contact forces have changed its
+    /// momenta: the remembered moves would leave an error as large as that of the iteration.
+    fn put_momentum_right(&mut self, x: &[Point], forces: &[Point], contact: Option<&[Point]>) {
+        let (mut load, mut moment) = (DVec3::ZERO, DVec3::ZERO);
+        for (node, &d) in self.step.correction.iter().enumerate() {
+            load += self.external(forces, node);
+            if let Some(contact) = contact {
+                load += DVec3::from_array(contact[node]);
+            }
+            moment += self.masses[node] * DVec3::from_array(d);
+        }
+        let shift = (self.gain() * (self.step.frame.transpose() * load) - moment) / self.mass;
+        for d in &mut self.step.correction {
+            *d = (DVec3::from_array(*d) + shift).to_array();
+        }
+        self.remove_torque(self.next_spin(x, forces, contact.unwrap_or(&[])));
+    }
+
+    /// Writes the forces that the correction so far leaves over.
+    fn find_residual(&self, method: &mut QuasiNewton, forces: &[Point], contact: Option<&[Point]>) {
+        let step = &self.step;
+        let (frame, to_frame) = (step.frame, step.frame.transpose());
+        for (x, predicted) in method.x.iter_mut().zip(&step.positions) {
+            *x = predicted.to_array();
+        }
+        for (&node, &d) in self.free_nodes.iter().zip(&step.correction) {
+            let node = node as usize;
+            method.x[node] = (step.positions[node] + frame * DVec3::from_array(d)).to_array();
+        }
+        method.tissue.forces(&method.x, &mut method.forces);
+        let inertia = self.inertia();
+        for ((residual, &d), &node) in
+            method.residual.iter_mut().zip(&step.correction).zip(&self.free_nodes)
+        {
+            let node = node as usize;
+            let mut force = DVec3::from_array(method.forces[node]) + self.external(forces, node);
+            if let Some(contact) = contact {
+                force += DVec3::from_array(contact[node]);
+            }
+            let left = to_frame * force - inertia * self.masses[node] * DVec3::from_array(d);
+            *residual = left.to_array();
+        }
+    }
+
+    /// Writes the next move to `scratch`; returns its longest part [m].
+    fn next_move(&mut self, method: &mut QuasiNewton, known: usize) -> f64 {
+        let QuasiNewton { residual, scratch, pairs, .. } = method;
+        scratch.copy_from_slice(residual);
+        for pair in pairs[..known].iter_mut().rev() {
+            pair.alpha = pair.rho * dot(&pair.s, scratch);
+            add_scaled(scratch, -pair.alpha, &pair.y);
+        }
+        self.respond_to(scratch);
+        for pair in &pairs[..known] {
+            let beta = pair.rho * dot(&pair.y, scratch);
+            add_scaled(scratch, pair.alpha - beta, &pair.s);
+        }
+        let lengths = scratch.iter().map(|&z| DVec3::from_array(z).length_squared());
+        lengths.fold(0.0, f64::max).sqrt()
+    }
+}
+
+fn dot(a: &[[f64; 3]], b: &[[f64; 3]]) -> f64 {
+    // Several sums at once: one would wait for every addition.
+    let mut sums = [0.0; 8];
+    let (a, a_rest) = a.as_flattened().as_chunks::<8>();
+    let (b, b_rest) = b.as_flattened().as_chunks::<8>();
+    for (a, b) in a.iter().zip(b) {
+        for k in 0..8 {
+            sums[k] += a[k] * b[k];
+        }
+    }
+    sums.iter().sum::<f64>() + a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum::<f64>()
+}
+
+fn add_scaled(to: &mut [[f64; 3]], factor: f64, from: &[[f64; 3]]) {
+    for (to, from) in to.as_flattened_mut().iter_mut().zip(from.as_flattened()) {
+        *to += factor * from;
+    }
+}
