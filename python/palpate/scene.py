@@ -307,7 +307,7 @@ class Scene:
         return (*arrays, index, distance)
 
     def memory(self) -> dict[str, float]:
-        """Bytes that the method keeps beside the meshes, by part; zero for methods without a layout.
+        """Bytes that the method keeps beside the meshes, by part; zero for methods without any.
 
         ``layout`` is the sum of all parts but ``buffers``, which grow with what is found.
         """
