@@ -156,7 +156,7 @@ impl Worker {
                 |pair: &TrianglePair| if of_a { pair.triangle_a } else { pair.triangle_b };
             inside.locate(body, crossing.iter().map(triangle), |node| {
                 cost.polygon_tests += 1;
-                surfaces.is_inside(into, &body.positions[node as usize])
+                Some(surfaces.is_inside(into, &body.positions[node as usize]))
             });
         };
         locate(inside_a, [a, b], true);

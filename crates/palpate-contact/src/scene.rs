@@ -445,7 +445,7 @@ impl Scene {
 
     fn check_positions<'a>(
         &self,
-        positions: impl Fn(usize) -> &'a [Point],
+        positions: impl Fn(usize) -> &'a [Point] + Sync,
     ) -> Result<(), SceneError> {
         for (index, body) in self.bodies.iter().enumerate() {
             let (given, expected) = (positions(index).len(), body.positions.len());
@@ -453,14 +453,18 @@ impl Scene {
                 return Err(SceneError::NodeCount { body: index, given, expected });
             }
         }
-        for body in 0..self.bodies.len() {
+        let broken = |body: usize| {
             let given = positions(body);
             let finite = |position: &Point| position.iter().all(|value| value.is_finite());
-            if let Some(node) = given.iter().position(|position| !finite(position)) {
-                return Err(SceneError::NotFinite { body, node, position: given[node] });
-            }
-        }
-        Ok(())
+            let node = given.iter().position(|position| !finite(position))?;
+            Some(SceneError::NotFinite { body, node, position: given[node] })
+        };
+        let bodies = 0..self.bodies.len();
+        let first = match &self.pool {
+            Some(pool) => pool.install(|| bodies.into_par_iter().find_map_first(broken)),
+            None => bodies.into_iter().find_map(broken),
+        };
+        first.map_or(Ok(()), Err)
     }
 }
 

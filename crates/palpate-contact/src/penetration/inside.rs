@@ -44,12 +44,13 @@ impl Inside {
         self.patch[triangle as usize]
     }
 
-    /// Locates the nodes of `body`, given its crossing triangles, some of them several times.
+    /// Locates the nodes of `body`, given its crossing triangles, some of them several times. A node
+    /// for which `is_inside` does not know leaves it to the others that it is connected with.
     pub(super) fn locate(
         &mut self,
         body: &SceneBody,
         crossing: impl Iterator<Item = u32>,
-        mut is_inside: impl FnMut(u32) -> bool,
+        mut is_inside: impl FnMut(u32) -> Option<bool>,
     ) {
         let (triangles, surface) = (body.mesh.triangles(), &body.surface);
         let node_count = body.mesh.nodes().len();
@@ -74,13 +75,14 @@ impl Inside {
         }
         for index in 0..self.border.len() {
             let node = self.border[index];
-            if self.sides[node as usize] == Side::Border {
-                let side = if is_inside(node) { Side::Inside } else { Side::Outside };
-                self.spread(body, node, side);
+            if self.sides[node as usize] == Side::Border
+                && let Some(inside) = is_inside(node)
+            {
+                self.spread(body, node, if inside { Side::Inside } else { Side::Outside });
             }
         }
         for &node in &surface.component_nodes {
-            if !self.component_crosses[node as usize] && is_inside(node) {
+            if !self.component_crosses[node as usize] && is_inside(node) == Some(true) {
                 let before = self.nodes.len();
                 self.spread(body, node, Side::Inside);
                 self.swallowed.extend(self.nodes.drain(before..).map(|inside| (node, inside)));

@@ -1,5 +1,6 @@
 //! Inside or outside, exactly: how often the surface winds around a point.
 
+use palpate_geometry::tetrahedron::orientation;
 use palpate_geometry::{Aabb, Point, predicates, triangles_intersect};
 
 use crate::nearest::{HalfLine, Surfaces};
@@ -40,17 +41,22 @@ impl Surfaces<'_> {
     /// body, folded, is inside itself there. Not where the node is exactly on another triangle.
     ///
     /// Counts them with their orientation: what the surface winds around the node, less what the
-    /// tetrahedra around the node themselves contribute. Both are rays along +x, moved alike.
-    pub(crate) fn is_covered(&self, body: u32, node: u32) -> bool {
+    /// tetrahedra around the node themselves contribute. Both are rays along +x, moved alike. `None` when
+    /// one of those around the node is flat or turned over: the node has then been pushed through its
+    /// neighbours, which says nothing of the rest of the body.
+    pub(crate) fn is_covered(&self, body: u32, node: u32) -> Option<bool> {
         let SceneBody { mesh, positions, surface, .. } = &self.bodies[body as usize];
         let point = &positions[node as usize];
         let is_other = |triangle: u32| !mesh.triangles()[triangle as usize].contains(&node);
         let Some(mut covering) = self.winding(body, point, is_other) else {
-            return false;
+            return Some(false);
         };
         for &tetrahedron in surface.tetrahedra_of_nodes(mesh).around(node) {
             let nodes = mesh.tetrahedra()[tetrahedron as usize];
             let [a, b, c, d] = nodes.map(|node| positions[node as usize]);
+            if orientation(&[a, b, c, d]) <= 0 {
+                return None;
+            }
             let opposite = match nodes.iter().position(|&corner| corner == node) {
                 Some(0) => [b, c, d],
                 Some(1) => [a, d, c],
@@ -59,7 +65,7 @@ impl Surfaces<'_> {
             };
             covering -= crossing(&opposite, point);
         }
-        covering != 0
+        Some(covering > 0)
     }
 
     /// Signed crossings of the half line from `point` along +x with the triangles of `of`; `None` when

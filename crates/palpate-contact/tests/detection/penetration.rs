@@ -426,6 +426,20 @@ fn nodes_inside_their_own_body_are_found() {
     assert_eq!(check(&Case::new("parts", vec![parts]), &[true]), 8);
 }
 
+#[test]
+fn a_node_pushed_through_its_own_tetrahedra_does_not_swallow_the_body() {
+    let mesh = block([6, 6, 6], |x| x);
+    let top = (0..mesh.nodes().len()).find(|&n| mesh.nodes()[n] == [3.0, 3.0, 6.0]).unwrap();
+    for depth in [1.2, 1.7, 2.3, 7.0] {
+        let mut positions = mesh.nodes().to_vec();
+        positions[top] = [3.1, 2.93, 6.0 - depth];
+        let mut scene = Scene::new(vec![mesh.clone()], None, SceneOptions::default()).unwrap();
+        scene.update(&[&positions]).unwrap();
+        let found = scene.penetration(&|_, _| true);
+        assert!(found.nodes.iter().all(|node| node.node as usize == top), "{depth}: {found:?}");
+    }
+}
+
 /// The nodes of two bodies in each other.
 fn depths(blocks: &[Arc<Mesh>; 2]) -> Vec<PenetratingNode> {
     let mut scene = scene(blocks, SceneOptions::default());
