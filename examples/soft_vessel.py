@@ -1,4 +1,4 @@
-"""A soft vessel, held at one end, sags under its weight: the linear law grows, nonlinear tissue does not."""
+"""A soft vessel held at one end sags: with the linear law it grows, as nonlinear tissue it does not."""
 
 import numpy as np
 
@@ -8,13 +8,14 @@ vessel = palpate.read_model("case1").bodies[1].mesh
 along = np.ptp(vessel.nodes, axis=0).argmax()  # the longest direction
 position = vessel.nodes[:, along]
 held = np.flatnonzero(position < position.min() + 0.1 * np.ptp(position))
-gravity = np.zeros(3)
+gravity = [0.0, 0.0, 0.0]
 gravity[(along + 1) % 3] = -9.81
 
 
 def volume(nodes: np.ndarray) -> float:
+    """Volume [m³] of the vessel with its nodes elsewhere."""
     a, b, c, d = (nodes[corner] for corner in vessel.tetrahedra.T)
-    return np.einsum("ij,ij->i", b - a, np.cross(c - a, d - a)).sum() / 6
+    return float(np.einsum("ij,ij->i", b - a, np.cross(c - a, d - a)).sum() / 6)
 
 
 for law in ("linear", "corotated", "neo-hookean"):
