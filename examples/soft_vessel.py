@@ -1,4 +1,4 @@
-"""A soft vessel held at one end sags: with the linear law it grows, as nonlinear tissue it does not."""
+"""A soft vessel held at one end sags: with the linear law it grows, nonlinear tissue does not."""
 
 import numpy as np
 
