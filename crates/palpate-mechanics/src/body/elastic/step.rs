@@ -34,6 +34,7 @@ pub(super) struct Step {
     pub(super) columns: Vec<[f64; 9]>,
     /// Rotations of the predicted positions of an unattached body.
     rotations: Rotations,
+    /// Whether loads turn the body by these rotations alone.
     turns: bool,
     /// How contact forces turn the body: known once it has been touched in about this shape.
     pub(super) turning: Turning,
@@ -94,8 +95,8 @@ impl ElasticBody {
             }
         }
         self.step.frame = self.fit_frame();
-        let mut elasticity = std::mem::take(&mut self.elasticity);
         self.find_rotations();
+        let mut elasticity = std::mem::take(&mut self.elasticity);
         self.find_deformation();
         self.step.touched = contact.is_some();
         self.step.response.fill([0.0; 3]);
@@ -235,10 +236,12 @@ impl ElasticBody {
             return;
         }
         let (center, to_frame) = (self.predicted_center(), self.step.frame.transpose());
-        let gain = self.gain();
+        let (gain, linear) = (self.gain(), self.is_linear());
         let Self { step, masses, .. } = self;
         let arms = step.positions.iter().map(|&x| to_frame * (x - center));
         let turns = step.rotations.set(masses, arms, gain);
+        // Elements of other laws turn by themselves, and iterating puts the rest right.
+        step.turns = turns && linear;
         step.turning_known &=
             turns && step.rotations.change(step.turning.rotations()) <= SHAPE_TOLERANCE;
     }
