@@ -17,7 +17,7 @@ use palpate_contact::PairKind;
 use palpate_geometry::Point;
 use palpate_model::Body;
 
-use crate::error::MechanicsError;
+use crate::error::{MechanicsError, check_parameters};
 pub(crate) use surface::Surface;
 
 /// A contact that carried a force in the last step.
@@ -106,18 +106,7 @@ impl ContactParameters {
                 "a positive number of Pa/m",
             ),
         ];
-        for (what, value, ok, expected) in checks {
-            if !ok {
-                let name = body.name.clone();
-                return Err(MechanicsError::BadParameter {
-                    body: index,
-                    name,
-                    what,
-                    value,
-                    expected,
-                });
-            }
-        }
+        check_parameters(index, body, &checks)?;
         let mean_edge = body.mesh.mean_surface_edge();
         let rigid = body.rigid.is_some();
         let own_distance = settings.distance.unwrap_or(DISTANCE_FACTOR * mean_edge);

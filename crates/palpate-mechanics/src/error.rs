@@ -1,5 +1,6 @@
 //! Why bodies cannot be simulated.
 
+use palpate_model::Body;
 use palpate_solver::FactorError;
 
 /// Why a model, a state or a step was refused.
@@ -104,4 +105,25 @@ pub enum MechanicsError {
     /// A contact of a state that names a body or node that does not exist, or is not finite.
     #[error("contact {0} of the state does not fit the bodies; is it a state of this model?")]
     BadContact(usize),
+}
+
+/// A parameter of a body: name, value, whether it is valid, what would be.
+pub(crate) type ParameterCheck = (&'static str, f64, bool, &'static str);
+
+/// The error of the first parameter that is not valid.
+pub(crate) fn check_parameters(
+    index: usize,
+    body: &Body,
+    checks: &[ParameterCheck],
+) -> Result<(), MechanicsError> {
+    match checks.iter().find(|(_, _, valid, _)| !valid) {
+        Some(&(what, value, _, expected)) => Err(MechanicsError::BadParameter {
+            body: index,
+            name: body.name.clone(),
+            what,
+            value,
+            expected,
+        }),
+        None => Ok(()),
+    }
 }

@@ -10,7 +10,7 @@
 //! `A = (1/dt² + alpha/dt) M + (1 + beta/dt) K`
 //!
 //! of the rest shape, in that frame, is exact. With any other law A is where a quasi-Newton method
-//! begins. A is constant, so its factor is made once.
+//! begins, and it follows the shape of the body; with the linear law its factor is made once.
 
 mod quasi_newton;
 mod spin;
@@ -77,7 +77,7 @@ impl ElasticBody {
         }
         let count = nodes.len();
         let material = &body.material;
-        let inertia = (1.0 / time_step + material.mass_damping) / time_step;
+        let inertia = inertia(time_step, material.mass_damping);
         let masses = lumped_masses(body);
         if let Some(node) = masses.iter().position(|&mass| mass <= 0.0) {
             return Err(MechanicsError::LooseNode { body: index, name: name(), node });
@@ -215,9 +215,8 @@ impl ElasticBody {
         }
     }
 
-    /// 1/dt² + alpha/dt: force [N] per mass and displacement.
     fn inertia(&self) -> f64 {
-        (1.0 / self.time_step + self.mass_damping) / self.time_step
+        inertia(self.time_step, self.mass_damping)
     }
 
     /// Displacement [m] of a step under unit force per unit mass.
@@ -237,38 +236,43 @@ impl ElasticBody {
         }
     }
 
-    fn center_of(&self, x: &[Point]) -> DVec3 {
-        let weighted = self.masses.iter().zip(x).map(|(&m, &x)| m * DVec3::from_array(x));
-        weighted.sum::<DVec3>() / self.mass
-    }
-
-    /// Frame of positions `x`.
-    fn frame_of(&self, x: &[Point]) -> DMat3 {
-        let center = self.center_of(x);
+    /// Centre of mass and frame of positions.
+    fn place_of(&self, positions: impl Iterator<Item = DVec3> + Clone) -> (DVec3, DMat3) {
+        let weighted = self.masses.iter().zip(positions.clone()).map(|(&m, x)| m * x);
+        let center = weighted.sum::<DVec3>() / self.mass;
         let mut fit = DMat3::ZERO;
-        for ((&m, &x), rest) in self.masses.iter().zip(x).zip(&self.rest) {
-            let r = m * (DVec3::from_array(x) - center);
+        for ((&m, x), rest) in self.masses.iter().zip(positions).zip(&self.rest) {
+            let r = m * (x - center);
             fit += DMat3::from_cols(rest.x * r, rest.y * r, rest.z * r);
         }
-        best_rotation(fit)
+        (center, best_rotation(fit))
+    }
+
+    /// Arms of positions `x` about their centre, in their frame [m].
+    fn arms_of(&self, x: &[Point]) -> (DMat3, impl Iterator<Item = DVec3>) {
+        let positions = x.iter().map(|&x| DVec3::from_array(x));
+        let (center, frame) = self.place_of(positions.clone());
+        let to_frame = frame.transpose();
+        (frame, positions.map(move |x| to_frame * (x - center)))
     }
 
     /// Elastic energy [J] at positions `x`.
     pub(crate) fn elastic_energy(&mut self, x: &[Point]) -> f64 {
-        let (center, to_frame) = (self.center_of(x), self.frame_of(x).transpose());
+        let strain: Vec<[f64; 3]> =
+            self.arms_of(x).1.zip(&self.rest).map(|(arm, &rest)| (arm - rest).to_array()).collect();
         let stiffness = match &mut self.elasticity {
             Elasticity::Linear(stiffness) => stiffness,
             Elasticity::Nonlinear(method) => return method.tissue.energy(x),
             Elasticity::None => unreachable!("only within a step"),
         };
-        let strain: Vec<[f64; 3]> = x
-            .iter()
-            .zip(&self.rest)
-            .map(|(&x, &rest)| (to_frame * (DVec3::from_array(x) - center) - rest).to_array())
-            .collect();
         let mut product = vec![[0.0; 3]; strain.len()];
         stiffness.multiply(&strain, &mut product);
         let pairs = strain.as_flattened().iter().zip(product.as_flattened());
         0.5 * pairs.map(|(u, f)| u * f).sum::<f64>()
     }
+}
+
+/// 1/dt² + alpha/dt: force [N] per mass and displacement.
+fn inertia(time_step: f64, mass_damping: f64) -> f64 {
+    (1.0 / time_step + mass_damping) / time_step
 }

@@ -1,6 +1,6 @@
 //! How an unattached body turns under contact forces.
 //!
-//! The stiffness is that of the rest shape, so its null space holds the rotations of the rest shape
+//! The linear law's stiffness is that of the rest shape, so its null space holds the rotations of the rest shape
 //! and not those of the deformed one: `A^-1 f` gives a deformed body a wrong angular momentum. With
 //! Q the rotations of the body as it is and `S = (Q^T M Q)^-1` the response is instead
 //!
@@ -9,6 +9,16 @@
 //! symmetric, positive, and with `Q^T M P = k Q^T`: contact torques change the spin by what they are.
 
 use glam::{DMat3, DVec3};
+
+/// Largest change of an arm from another shape, relative to the longest arm.
+pub(super) fn largest_change(arms: impl Iterator<Item = DVec3>, others: &[DVec3]) -> f64 {
+    let (mut change, mut radius) = (0.0_f64, 0.0_f64);
+    for (arm, &other) in arms.zip(others) {
+        change = change.max((arm - other).length_squared());
+        radius = radius.max(arm.length_squared());
+    }
+    (change / radius).sqrt()
+}
 
 /// Rotations of one body in its frame.
 #[derive(Debug, Default)]
@@ -44,16 +54,6 @@ impl Rotations {
     /// Arms of all nodes about the centre, in the frame [m].
     pub(super) fn arms(&self) -> &[DVec3] {
         &self.arms
-    }
-
-    /// Largest difference of an arm from that of other rotations, relative to the longest arm.
-    pub(super) fn change(&self, other: &Self) -> f64 {
-        let (mut change, mut radius) = (0.0_f64, 0.0_f64);
-        for (&arm, &other) in self.arms.iter().zip(&other.arms) {
-            change = change.max((arm - other).length_squared());
-            radius = radius.max(arm.length_squared());
-        }
-        (change / radius).sqrt()
     }
 
     /// Takes the inertial loads of the turn out of `loads`; returns their torque.

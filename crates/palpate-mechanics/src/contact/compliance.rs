@@ -1,6 +1,6 @@
 //! Displacements of a body's surface under unit forces on its nodes, in the body's frame.
 //!
-//! The body's matrix never changes, so a column that was solved once serves every later step. Columns
+//! A column that was solved once serves every later step, until the body's matrix is made anew. Columns
 //! are single precision: they shape the contact forces, whose response is solved in double precision.
 //! The matrix is symmetric: of each column only the part from the node itself on is kept.
 

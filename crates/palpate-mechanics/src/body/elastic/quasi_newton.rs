@@ -1,8 +1,8 @@
-//! The step with a nonlinear law: a quasi-Newton method that begins with the matrix of the rest shape.
+//! The step with a nonlinear law: a quasi-Newton method around the matrix of a recent shape.
 //!
-//! Limited-memory BFGS (Nocedal 1980) around a factored constant matrix, as Liu, Bouaziz and Kavan
-//! (2017) do for hyperelastic bodies: an iteration costs the internal forces once and a solve, and no
-//! matrix is assembled or factored in a step.
+//! Limited-memory BFGS (Nocedal 1980) around a factored matrix, as Liu, Bouaziz and Kavan (2017) do for
+//! hyperelastic bodies: an iteration costs the internal forces once and a solve. The matrix is made
+//! anew at the end of a step that took many iterations or deformed the body much.
 
 use std::sync::Arc;
 
@@ -13,6 +13,7 @@ use palpate_solver::BlockMatrix;
 
 use super::system::SystemMatrix;
 use super::{ElasticBody, Elasticity, FIXED};
+use crate::body::turning::largest_change;
 use crate::materials::tissue_of;
 use crate::tissue::{Tissue, VolumeAveraging};
 
@@ -47,6 +48,8 @@ pub(super) struct QuasiNewton {
     system: SystemMatrix,
     /// Where the stiffness was taken [m]; empty: at rest.
     stiff_shape: Vec<Point>,
+    /// Arms of that shape about its centre, in its frame [m].
+    stiff_arms: Vec<DVec3>,
     /// Iterations of the last step.
     iterations: u32,
 }
@@ -81,6 +84,7 @@ impl QuasiNewton {
             stiffness,
             system,
             stiff_shape: Vec::with_capacity(node_count),
+            stiff_arms: Vec::with_capacity(node_count),
             iterations: 0,
         }
     }
@@ -96,6 +100,8 @@ impl QuasiNewton {
         for (x, rest) in self.x.iter_mut().zip(rest) {
             *x = rest.to_array();
         }
+        self.stiff_arms.clear();
+        self.stiff_arms.extend_from_slice(rest);
         self.system_at_trial(DMat3::IDENTITY, masses, inertia, time_step)
     }
 
@@ -159,21 +165,7 @@ impl ElasticBody {
 
     /// Whether positions `x` differ much in shape from those that A is made of.
     fn is_deformed(&self, method: &QuasiNewton, x: &[Point]) -> bool {
-        let arms = |x: &[Point]| (self.center_of(x), self.frame_of(x).transpose());
-        let (center, to_frame) = arms(x);
-        let stiff = &method.stiff_shape;
-        let (stiff_center, to_stiff) = arms(if stiff.is_empty() { x } else { stiff });
-        let (mut change, mut radius) = (0.0_f64, 0.0_f64);
-        for (node, (&x, &rest)) in x.iter().zip(&self.rest).enumerate() {
-            let arm = to_frame * (DVec3::from_array(x) - center);
-            let other = match stiff.get(node) {
-                Some(&stiff) => to_stiff * (DVec3::from_array(stiff) - stiff_center),
-                None => rest,
-            };
-            change = change.max((arm - other).length_squared());
-            radius = radius.max(arm.length_squared());
-        }
-        change > DEFORMED * DEFORMED * radius
+        largest_change(self.arms_of(x).1, &method.stiff_arms) > DEFORMED
     }
 
     /// Makes A of the stiffness at `shape`, or of that at rest if it is empty; true if A has changed.
@@ -187,7 +179,9 @@ impl ElasticBody {
         let (inertia, time_step) = (self.inertia(), self.time_step);
         if !shape.is_empty() {
             method.x.copy_from_slice(shape);
-            let frame = self.frame_of(shape);
+            let (frame, arms) = self.arms_of(shape);
+            method.stiff_arms.clear();
+            method.stiff_arms.extend(arms);
             let system = method.system_at_trial(frame, &self.masses, inertia, time_step);
             if self.factor.refactor(system).is_ok() {
                 method.stiff_shape.extend_from_slice(shape);

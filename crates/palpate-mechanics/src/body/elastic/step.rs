@@ -6,9 +6,8 @@ use palpate_geometry::Point;
 use palpate_solver::{BlockMatrix, SolveWorkspace};
 
 use super::{ElasticBody, Elasticity, FIXED};
-use crate::body::frame::best_rotation;
 use crate::body::inertia::{Inertia, RunningInertia};
-use crate::body::turning::{Rotations, Turning};
+use crate::body::turning::{Rotations, Turning, largest_change};
 use crate::state::BodyState;
 
 /// Part of the body's radius by which its shape may change before its response is computed again.
@@ -17,6 +16,8 @@ const SHAPE_TOLERANCE: f64 = 1e-3;
 /// What a step computes; kept between its two halves.
 pub(super) struct Step {
     pub(super) start: Inertia,
+    /// Centre of mass and frame of the predicted positions.
+    center: DVec3,
     pub(super) frame: DMat3,
     /// Predicted positions and velocities.
     pub(super) positions: Vec<DVec3>,
@@ -53,6 +54,7 @@ impl Step {
     ) -> Self {
         Self {
             start,
+            center: DVec3::ZERO,
             frame: DMat3::IDENTITY,
             positions: vec![DVec3::ZERO; node_count],
             velocities: vec![DVec3::ZERO; node_count],
@@ -94,7 +96,7 @@ impl ElasticBody {
                 self.step.velocities[node] = if free { v } else { DVec3::ZERO };
             }
         }
-        self.step.frame = self.fit_frame();
+        (self.step.center, self.step.frame) = self.place_of(self.step.positions.iter().copied());
         self.find_rotations();
         let mut elasticity = std::mem::take(&mut self.elasticity);
         self.find_deformation();
@@ -145,7 +147,7 @@ impl ElasticBody {
     /// folds, so it is left out here, and [`ElasticBody::remove_torque`] does its work on the result.
     /// Where nodes are fixed, they take that torque: it is of second order in the strain.
     fn load_elastic(&mut self, stiffness: &BlockMatrix, forces: &[Point]) {
-        let (center, to_frame) = (self.predicted_center(), self.step.frame.transpose());
+        let (center, to_frame) = (self.step.center, self.step.frame.transpose());
         for node in 0..self.masses.len() {
             let r = to_frame * (self.step.positions[node] - center);
             let strain = r - self.rest[node] + self.damping * self.step.deformation[node];
@@ -164,27 +166,6 @@ impl ElasticBody {
     pub(super) fn external(&self, forces: &[Point], node: usize) -> DVec3 {
         let braking = self.mass_damping * self.step.velocities[node];
         DVec3::from_array(forces[node]) + self.masses[node] * (self.gravity - braking)
-    }
-
-    /// Frame of the predicted positions.
-    fn fit_frame(&self) -> DMat3 {
-        let center = self.predicted_center();
-        let mut fit = DMat3::ZERO;
-        for ((&m, &x), &rest) in self.masses.iter().zip(&self.step.positions).zip(&self.rest) {
-            let r = m * (x - center);
-            fit += DMat3::from_cols(rest.x * r, rest.y * r, rest.z * r);
-        }
-        best_rotation(fit)
-    }
-
-    fn predicted_center(&self) -> DVec3 {
-        let mut center = DVec3::ZERO;
-        let mut total = 0.0;
-        for (&m, &x) in self.masses.iter().zip(&self.step.positions) {
-            center += m * x;
-            total += m;
-        }
-        center / total
     }
 
     /// Velocity of the predicted body in the frame, without its rotation.
@@ -235,15 +216,16 @@ impl ElasticBody {
         if !self.is_unattached() {
             return;
         }
-        let (center, to_frame) = (self.predicted_center(), self.step.frame.transpose());
+        let (center, to_frame) = (self.step.center, self.step.frame.transpose());
         let (gain, linear) = (self.gain(), self.is_linear());
         let Self { step, masses, .. } = self;
         let arms = step.positions.iter().map(|&x| to_frame * (x - center));
         let turns = step.rotations.set(masses, arms, gain);
         // Elements of other laws turn by themselves, and iterating puts the rest right.
         step.turns = turns && linear;
+        let (arms, known) = (step.rotations.arms(), step.turning.rotations().arms());
         step.turning_known &=
-            turns && step.rotations.change(step.turning.rotations()) <= SHAPE_TOLERANCE;
+            turns && largest_change(arms.iter().copied(), known) <= SHAPE_TOLERANCE;
     }
 
     /// How contact forces turn the body; `None` if it is attached.

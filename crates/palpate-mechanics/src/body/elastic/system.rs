@@ -9,7 +9,7 @@ use palpate_solver::{BlockMatrix, BlockPattern, FactorError};
 
 use super::FIXED;
 use crate::body::element::{lame_parameters, shape_gradients, stiffness_block};
-use crate::error::MechanicsError;
+use crate::error::{MechanicsError, check_parameters};
 use crate::materials::check_laws;
 
 /// A quarter of the mass of each tetrahedron at its nodes [kg].
@@ -140,23 +140,10 @@ pub(super) fn check_material(index: usize, body: &Body) -> Result<(), MechanicsE
                 "a number of 1/s, not negative",
             ),
         ];
-        for (what, value, ok, expected) in checks {
-            if !ok {
-                let name = body.name.clone();
-                return Err(MechanicsError::BadParameter {
-                    body: index,
-                    name,
-                    what,
-                    value,
-                    expected,
-                });
-            }
-        }
+        check_parameters(index, body, &checks)?;
     }
     let velocity = body.initial_velocity.iter().copied().find(|value| !value.is_finite());
-    if let Some(value) = velocity {
-        let (name, what, expected) = (body.name.clone(), "initial velocity", "finite numbers");
-        return Err(MechanicsError::BadParameter { body: index, name, what, value, expected });
-    }
-    Ok(())
+    let value = velocity.unwrap_or_default();
+    let check = ("initial velocity", value, value.is_finite(), "finite numbers");
+    check_parameters(index, body, &[check])
 }
