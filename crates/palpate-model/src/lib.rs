@@ -15,6 +15,6 @@ pub use language::{
     CoreLoader, Diagnostic, Document, LoadError, MeshLoader, ModelError, load_model,
 };
 pub use mesh::{
-    Defect, DefectKind, ElementKind, FIBRE_FAMILIES, Indices, Mesh, MeshData, MeshError, NONE,
-    NodeTriangles, QualitySummary, RepairReport, TETRAHEDRON_FACES,
+    Defect, DefectKind, ElementKind, FIBRE_FAMILIES, Indices, Mesh, MeshChange, MeshData,
+    MeshError, NONE, NodeOrigin, NodeTriangles, QualitySummary, RepairReport, TETRAHEDRON_FACES,
 };

@@ -1,6 +1,7 @@
 //! The mesh of one body: nodes, tetrahedra and the surface triangles found from them.
 
 mod adjacency;
+mod change;
 mod check;
 mod defects;
 mod error;
@@ -14,6 +15,7 @@ use palpate_geometry::{Aabb, Point};
 use serde::{Deserialize, Serialize, Serializer};
 
 pub use adjacency::NodeTriangles;
+pub use change::{MeshChange, NodeOrigin};
 pub use check::RepairReport;
 pub use defects::{Defect, DefectKind};
 pub use error::{ElementKind, Indices, MeshError};

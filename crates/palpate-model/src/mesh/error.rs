@@ -188,6 +188,26 @@ pub enum MeshError {
         counted(.0.count, "triangle has", "triangles have"), .0
     )]
     DuplicateTriangles(Indices),
+    /// A tetrahedron to be removed that the mesh does not have.
+    #[error("tetrahedron {tetrahedron} cannot be removed: the mesh has {count} tetrahedra")]
+    RemovedOutOfRange {
+        /// The index.
+        tetrahedron: u32,
+        /// How many tetrahedra there are.
+        count: usize,
+    },
+    /// A tetrahedron that is to be removed twice.
+    #[error("tetrahedron {tetrahedron} is to be removed twice; name each one once")]
+    RemovedTwice {
+        /// The index.
+        tetrahedron: u32,
+    },
+    /// All tetrahedra are to be removed.
+    #[error("removing all {removed} tetrahedra would leave nothing; leave at least one")]
+    NothingRemains {
+        /// How many tetrahedra there are.
+        removed: usize,
+    },
     /// New positions for a mesh with another number of nodes.
     #[error("{found} positions for a mesh of {expected} nodes")]
     NodeCount {
