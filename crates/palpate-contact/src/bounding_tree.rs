@@ -1,6 +1,7 @@
 //! The bounding tree: a binary tree of boxes over a body's tetrahedra, made once, refitted each step.
 
 mod build;
+mod change;
 mod refit;
 mod traverse;
 mod validate;
@@ -43,7 +44,8 @@ const _: () = assert!(size_of::<TreeNode>() == 64);
 
 /// Binary tree of boxes over all tetrahedra of one mesh (over its triangles when it has no others).
 ///
-/// The shape is fixed by the positions at construction; [`BoundingTree::refit`] moves the boxes.
+/// The shape is fixed by the positions at construction; [`BoundingTree::refit`] moves the boxes, and a
+/// cut changes which elements the leaves hold, never the leaves.
 /// Source: spec/paper, "The binary tree, built in two steps".
 #[derive(Clone, Debug, PartialEq)]
 pub struct BoundingTree {
@@ -56,6 +58,8 @@ pub struct BoundingTree {
     /// Boxes of the triangles, in `triangle_order`.
     triangle_bounds: Vec<Aabb>,
     leaf_size: usize,
+    /// Whether the mesh has changed since: leaves may hold any number of elements.
+    changed: bool,
 }
 
 /// Figures of a tree's shape.
@@ -75,7 +79,7 @@ pub struct TreeStats {
     pub depth_max: usize,
     /// Mean depth of the leaves.
     pub depth_mean: f64,
-    /// `leaf_fill[n]`: leaves that hold n elements, n = 0..=K.
+    /// `leaf_fill[n]`: leaves that hold n elements, n = 0..=K, or more where the mesh was cut.
     pub leaf_fill: Vec<usize>,
 }
 
@@ -106,7 +110,7 @@ impl BoundingTree {
         self.nodes.first().map_or(Aabb::EMPTY, |root| root.bounds)
     }
 
-    /// Most elements in a leaf: K.
+    /// Most elements in a leaf at construction: K.
     pub fn leaf_size(&self) -> usize {
         self.leaf_size
     }
@@ -171,7 +175,9 @@ impl BoundingTree {
     pub fn stats(&self) -> TreeStats {
         let mut leaf_fill = vec![0; self.leaf_size.min(self.element_order.len()) + 1];
         for &leaf in &self.leaves {
-            leaf_fill[self.elements(leaf as usize).len()] += 1;
+            let fill = self.elements(leaf as usize).len();
+            leaf_fill.resize(leaf_fill.len().max(fill + 1), 0);
+            leaf_fill[fill] += 1;
         }
         let depths = self.leaf_depths();
         TreeStats {

@@ -66,6 +66,11 @@ impl Groups {
         })
     }
 
+    /// The group of each triangle.
+    pub(crate) fn of_triangles(&self) -> &[u32] {
+        &self.triangles
+    }
+
     fn of_triangle(&self, triangle: u32) -> &[u32] {
         let group = &self.triangles[triangle as usize];
         if *group == 0 { &[] } else { std::slice::from_ref(group) }

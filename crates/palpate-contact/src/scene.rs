@@ -1,5 +1,6 @@
 //! The scene: bodies whose nodes move, and what touches what among them.
 
+mod change;
 mod error;
 mod lazy_tree;
 mod memory;

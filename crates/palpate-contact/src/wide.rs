@@ -61,9 +61,10 @@ pub(crate) struct WideBody {
 }
 
 impl WideBody {
-    /// Packs the surface of `mesh`.
-    pub(crate) fn pack(mesh: &Arc<Mesh>) -> Self {
-        let at = |node: u32| mesh.nodes()[node as usize];
+    /// Packs the surface of `mesh`, elements that are close to each other at `positions` together: the
+    /// two sides of a cut coincide at rest.
+    pub(crate) fn pack(mesh: &Arc<Mesh>, positions: &[Point]) -> Self {
+        let at = |node: u32| positions[node as usize];
         let node_positions: Vec<Point> = mesh.surface_nodes().iter().map(|&n| at(n)).collect();
         let order = order::block_order(&node_positions);
         let surface_nodes: Vec<u32> =

@@ -15,6 +15,10 @@ impl<'a> Elements<'a> {
         Self { mesh }
     }
 
+    pub(super) fn mesh(&self) -> &'a Mesh {
+        self.mesh
+    }
+
     pub(super) fn len(&self) -> usize {
         if self.mesh.tetrahedra().is_empty() {
             self.mesh.triangles().len()
@@ -63,50 +67,31 @@ pub(super) fn build(mesh: &Mesh, leaf_size: usize, split: Split) -> BoundingTree
     let mut element_order: Vec<u32> = (0..elements.len() as u32).collect();
     let nodes = split_all(&elements, &mut element_order, leaf_size, split);
 
-    let mut position_of_element = vec![0; elements.len()];
-    for (position, &element) in element_order.iter().enumerate() {
-        position_of_element[element as usize] = position as u32;
-    }
-    let position_of_owner = |&triangle: &u32| {
-        (position_of_element[elements.owner(triangle as usize) as usize], triangle)
-    };
-    let mut triangle_order: Vec<u32> = (0..mesh.triangles().len() as u32).collect();
-    triangle_order.sort_unstable_by_key(position_of_owner);
-
-    let triangles_before = |position: u32| {
-        triangle_order.partition_point(|triangle| position_of_owner(triangle).0 < position) as u32
-    };
     let mut tree = BoundingTree {
+        nodes,
         leaves: Vec::new(),
-        corners: triangle_order.iter().map(|&t| mesh.triangles()[t as usize]).collect(),
-        triangle_bounds: vec![Aabb::EMPTY; triangle_order.len()],
-        nodes: Vec::new(),
         element_order,
         triangle_order: Vec::new(),
+        corners: Vec::new(),
+        triangle_bounds: Vec::new(),
         leaf_size,
+        changed: false,
     };
-    tree.nodes = nodes
-        .iter()
-        .map(|&(mut node, end)| {
-            node.triangles = [triangles_before(node.first_element), triangles_before(end)];
-            node
-        })
-        .collect();
-    tree.triangle_order = triangle_order;
+    tree.place_triangles(&elements);
     tree.leaves =
         (0..tree.nodes.len() as u32).filter(|&node| tree.is_leaf(node as usize)).collect();
     tree
 }
 
-/// Nodes in preorder, each with the end of its range in `order`, which is permuted to leaf order.
+/// Nodes in preorder, their elements ranges of `order`, which is permuted to leaf order.
 fn split_all(
     elements: &Elements,
     order: &mut [u32],
     leaf_size: usize,
     split: Split,
-) -> Vec<(TreeNode, u32)> {
+) -> Vec<TreeNode> {
     let centroids: Vec<Point> = (0..elements.len()).map(|e| elements.centroid(e)).collect();
-    let mut nodes: Vec<(TreeNode, u32)> = Vec::new();
+    let mut nodes: Vec<TreeNode> = Vec::new();
     // A stack of our own: clustered elements can make the tree deeper than a thread's stack allows.
     let mut pending = vec![(0, order.len())];
     while let Some((start, end)) = pending.pop() {
@@ -117,19 +102,19 @@ fn split_all(
             first_element: start as u32,
             triangles: [0; 2],
         };
-        nodes.push((node, end as u32));
+        nodes.push(node);
         if end - start > leaf_size {
             let middle = start + split_range(elements, &centroids, &mut order[start..end], split);
             // Marks an inner node until the size of its subtree is known.
-            nodes[index as usize].0.skip = 0;
+            nodes[index as usize].skip = 0;
             pending.push((middle, end));
             pending.push((start, middle));
         }
     }
     for index in (0..nodes.len()).rev() {
-        if nodes[index].0.skip == 0 {
-            let right = nodes[index + 1].0.skip as usize;
-            nodes[index].0.skip = nodes[right].0.skip;
+        if nodes[index].skip == 0 {
+            let right = nodes[index + 1].skip as usize;
+            nodes[index].skip = nodes[right].skip;
         }
     }
     nodes

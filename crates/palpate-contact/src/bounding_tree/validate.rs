@@ -17,7 +17,7 @@ pub enum TreeDefect {
         /// The tree node.
         node: usize,
     },
-    /// A leaf with no or too many elements.
+    /// A leaf with no or too many elements, the mesh not having been changed.
     #[error("leaf {node} holds {count} elements, expected 1 to {leaf_size}")]
     LeafFill {
         /// The tree node.
@@ -87,7 +87,7 @@ impl BoundingTree {
             }
             let Some([left, right]) = self.children(index) else {
                 let fill = self.elements(index).len();
-                if fill == 0 || fill > self.leaf_size {
+                if !self.changed && (fill == 0 || fill > self.leaf_size) {
                     let leaf_size = self.leaf_size;
                     return Err(TreeDefect::LeafFill { node: index, count: fill, leaf_size });
                 }

@@ -219,7 +219,7 @@ impl Detector for Wide {
             let same = former.iter().position(|packed| packed.is_of(&body.mesh));
             self.bodies.push(match same {
                 Some(index) => former.swap_remove(index),
-                None => WideBody::pack(&body.mesh),
+                None => WideBody::pack(&body.mesh, &body.positions),
             });
         }
     }

@@ -47,6 +47,14 @@ pub enum SceneError {
         /// Nodes of the body's mesh.
         expected: usize,
     },
+    /// A change of another mesh than the body's.
+    #[error("change: it is not one of the mesh of body {body}: {reason}")]
+    OtherMesh {
+        /// The body.
+        body: usize,
+        /// What does not fit.
+        reason: &'static str,
+    },
     /// Groups for another number of triangles.
     #[error(
         "groups: got {given}, expected {expected}, one for each surface triangle of body {body}"

@@ -29,6 +29,13 @@ impl LazyTree {
         })
     }
 
+    /// The tree, whatever positions it is at; afterwards it must be refitted.
+    pub(super) fn get_mut(&mut self) -> &mut BoundingTree {
+        self.set_moved();
+        let waiting = self.waiting.get_mut().unwrap_or_else(PoisonError::into_inner);
+        waiting.as_mut().expect("a tree that is not current waits")
+    }
+
     pub(super) fn set_moved(&mut self) {
         if let Some(tree) = self.current.take() {
             *self.waiting.get_mut().unwrap_or_else(PoisonError::into_inner) = Some(tree);

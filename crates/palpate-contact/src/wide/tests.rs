@@ -99,7 +99,7 @@ fn boxes_hold_their_triangles_and_children_at_any_scale() {
     let mut random = Random(11);
     for round in 0..300 {
         let mesh = tangle(1 + random.below(200), &mut random);
-        let mut body = WideBody::pack(&mesh);
+        let mut body = WideBody::pack(&mesh, mesh.nodes());
         let positions = positions(&mesh, round, &mut random);
         let origin = if round % 2 == 0 { [0.0; 3] } else { positions[0] };
         body.refit(Isa::detect(), &positions, origin);
@@ -141,7 +141,8 @@ fn boxes_hold_their_triangles_and_children_at_any_scale() {
 fn adjacency_is_what_the_corners_say() {
     let mut random = Random(5);
     for count in [1, 7, 8, 9, 64, 65, 150] {
-        let body = WideBody::pack(&tangle(count, &mut random));
+        let mesh = tangle(count, &mut random);
+        let body = WideBody::pack(&mesh, mesh.nodes());
         let (a, b, c) = (&body.triangles, &body.edges, &body.points);
         check_adjacency(a, a, true, &body.triangles_of_triangles);
         check_adjacency(b, b, true, &body.edges_of_edges);
@@ -217,7 +218,7 @@ fn kernels_give_the_bits_of_plain_rust(fast: Isa) {
         let moved = [0, 1].map(|i| positions(&meshes[i], round, &mut random));
         let packed = |isa: Isa| -> [WideBody; 2] {
             [0, 1].map(|i| {
-                let mut body = WideBody::pack(&meshes[i]);
+                let mut body = WideBody::pack(&meshes[i], meshes[i].nodes());
                 body.refit(isa, &moved[i], moved[0][0]);
                 body.refit_features(isa);
                 body
@@ -295,7 +296,7 @@ fn what_certainly_crosses_meets() {
         let moved = [0, 1].map(|i| positions(&meshes[i], round, &mut random));
         let origin = if round % 2 == 0 { [0.0; 3] } else { moved[0][0] };
         let [a, b] = [0, 1].map(|i| {
-            let mut body = WideBody::pack(&meshes[i]);
+            let mut body = WideBody::pack(&meshes[i], meshes[i].nodes());
             body.refit(Isa::detect(), &moved[i], origin);
             body
         });

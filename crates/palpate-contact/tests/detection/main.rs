@@ -1,5 +1,6 @@
 //! Detection against its slow, obvious twins.
 
+mod change;
 mod intersections;
 mod left_out;
 mod organs;
