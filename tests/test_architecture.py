@@ -9,6 +9,7 @@ ROOT = Path(__file__).parent.parent
 ALLOWED = {
     "palpate-geometry": set(),
     "palpate-model": {"palpate-geometry"},
+    "palpate-cutting": {"palpate-geometry", "palpate-model"},
     "palpate-contact": {"palpate-geometry", "palpate-model"},
     "palpate-solver": set(),
     "palpate-mechanics": {
@@ -17,7 +18,13 @@ ALLOWED = {
         "palpate-contact",
         "palpate-solver",
     },
-    "palpate": {"palpate-geometry", "palpate-model", "palpate-contact", "palpate-mechanics"},
+    "palpate": {
+        "palpate-geometry",
+        "palpate-model",
+        "palpate-cutting",
+        "palpate-contact",
+        "palpate-mechanics",
+    },
     "palpate-python": {"palpate"},
 }
 

@@ -69,7 +69,22 @@ pub fn quality(t: &[Point; 4]) -> TetrahedronQuality {
         min_dihedral = min_dihedral.min(angle);
         max_dihedral = max_dihedral.max(angle);
     }
+    let radius_ratio = radius_ratio_of([u, v, w]);
+    TetrahedronQuality { min_dihedral, max_dihedral, radius_ratio }
+}
 
+/// `3 r_in / r_out` of the inscribed and circumscribed spheres, as [`quality`] has it.
+pub fn radius_ratio(t: &[Point; 4]) -> f64 {
+    let edges = edges_from_first(t);
+    let size = edges.iter().map(|&edge| vec3::max_abs(edge)).fold(0.0, f64::max);
+    let factor = if size > 0.0 { size } else { 1.0 };
+    radius_ratio_of(edges.map(|edge| edge.map(|value| value / factor)))
+}
+
+/// The radius ratio, from edges at unit scale.
+fn radius_ratio_of([u, v, w]: [Point; 3]) -> f64 {
+    let determinant = vec3::dot(vec3::cross(u, v), w).abs();
+    let corners = [[0.0; 3], u, v, w];
     // r_in = |det| / (2 area) and r_out = |numerator| / (2 |det|), area over all four faces.
     let mut area = 0.0;
     for [i, j, k] in FACES {
@@ -81,12 +96,11 @@ pub fn quality(t: &[Point; 4]) -> TetrahedronQuality {
         .map(|(p, q, r)| vec3::scale(vec3::cross(q, r), vec3::norm_squared(p)))
         .fold([0.0; 3], vec3::add);
     let denominator = area * vec3::norm(numerator);
-    let radius_ratio = if determinant > 0.0 && denominator > 0.0 {
+    if determinant > 0.0 && denominator > 0.0 {
         (3.0 * determinant * determinant / denominator).min(1.0)
     } else {
         0.0
-    };
-    TetrahedronQuality { min_dihedral, max_dihedral, radius_ratio }
+    }
 }
 
 fn edges_from_first(t: &[Point; 4]) -> [Point; 3] {

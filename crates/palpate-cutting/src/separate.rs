@@ -1,0 +1,177 @@
+//! Opens the faces that lie on the sheet between its two sides, by copying nodes.
+
+use palpate_geometry::vec3;
+use palpate_model::TETRAHEDRON_FACES;
+
+use crate::crossing::Sides;
+use crate::draft::Draft;
+
+/// What was opened.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Opened {
+    /// Copies of nodes that were made.
+    pub(crate) copies: usize,
+    /// Area [m²] of one lip, at present positions.
+    pub(crate) area: f64,
+    /// Largest distance [m] of a node of the lips from the blade's surface, continued beyond its border.
+    pub(crate) deviation: f64,
+}
+
+/// Opens every face on the sheet that has tetrahedra of both sides, at least one of them touched, or is covered by the
+/// sheet.
+///
+/// Around each node of such faces, tetrahedra that are still joined by other faces keep one copy of the node: at the end of a
+/// partial cut all of them are, and it stays closed.
+pub(crate) fn open(
+    draft: &mut Draft,
+    is_touched: &[bool],
+    covered: &[[u32; 3]],
+    sides: &mut Sides,
+) -> Opened {
+    let cut = faces_to_open(draft, is_touched, covered, sides);
+    let mut opened = Opened::default();
+    let mut is_marked = vec![false; draft.positions.len()];
+    for face in &cut {
+        let [a, b, c] = face.map(|node| draft.positions[node as usize]);
+        opened.area += 0.5 * vec3::norm(vec3::cross(vec3::sub(b, a), vec3::sub(c, a)));
+        for &node in face {
+            is_marked[node as usize] = true;
+            opened.deviation = opened.deviation.max(sides.side(node).height.abs());
+        }
+    }
+    opened.copies = copy_nodes(draft, &cut, &is_marked);
+    opened
+}
+
+/// Sorted nodes of the faces to open, sorted.
+fn faces_to_open(
+    draft: &Draft,
+    is_touched: &[bool],
+    covered: &[[u32; 3]],
+    sides: &mut Sides,
+) -> Vec<[u32; 3]> {
+    let mut faces: Vec<([u32; 3], u32)> = Vec::new();
+    for (tetrahedron, nodes) in draft.tetrahedra.iter().enumerate() {
+        let on = nodes.map(|node| sides.is_on(node));
+        if on.iter().filter(|&&on| on).count() < 3 {
+            continue;
+        }
+        for face in TETRAHEDRON_FACES.iter().filter(|face| face.iter().all(|&k| on[k])) {
+            faces.push((sorted(face.map(|corner| nodes[corner])), tetrahedron as u32));
+        }
+    }
+    faces.sort_unstable();
+    let mut cut = Vec::new();
+    for pair in faces.chunk_by(|left, right| left.0 == right.0) {
+        let &[(face, left), (_, right)] = pair else {
+            continue;
+        };
+        let is_reached = is_touched[left as usize]
+            || is_touched[right as usize]
+            || covered.binary_search(&face).is_ok();
+        if is_reached && is_above(draft, left, sides) != is_above(draft, right, sides) {
+            cut.push(face);
+        }
+    }
+    cut
+}
+
+/// The side of a tetrahedron with at least three nodes on the sheet.
+fn is_above(draft: &Draft, tetrahedron: u32, sides: &mut Sides) -> bool {
+    let nodes = draft.tetrahedra[tetrahedron as usize];
+    let found = nodes.map(|node| sides.of(node, &draft.positions));
+    match found.iter().find(|side| side.sign != 0) {
+        Some(side) => side.sign > 0,
+        // All were taken to lie on it: where the middle is.
+        None => found.iter().map(|side| side.height).sum::<f64>() >= 0.0,
+    }
+}
+
+/// Gives each group of tetrahedra around a marked node its own copy; returns how many were made.
+fn copy_nodes(draft: &mut Draft, cut: &[[u32; 3]], is_marked: &[bool]) -> usize {
+    let has_marked = |nodes: &[u32]| nodes.iter().any(|&node| is_marked[node as usize]);
+    let around: Vec<u32> = (0..draft.tetrahedra.len() as u32)
+        .filter(|&tetrahedron| has_marked(&draft.tetrahedra[tetrahedron as usize]))
+        .collect();
+    let mut faces: Vec<([u32; 3], u32)> = Vec::with_capacity(4 * around.len());
+    for (place, &tetrahedron) in around.iter().enumerate() {
+        let nodes = draft.tetrahedra[tetrahedron as usize];
+        for face in TETRAHEDRON_FACES {
+            let face = sorted(face.map(|corner| nodes[corner]));
+            if has_marked(&face) && cut.binary_search(&face).is_err() {
+                faces.push((face, place as u32));
+            }
+        }
+    }
+    faces.sort_unstable();
+
+    // A slot is a corner of a tetrahedron; those that a face joins use one copy.
+    let mut slots = Groups::new(4 * around.len());
+    let slot = |place: u32, node: u32| {
+        let nodes = draft.tetrahedra[around[place as usize] as usize];
+        let corner = nodes.iter().position(|&other| other == node).expect("a node of its face");
+        4 * place + corner as u32
+    };
+    for same in faces.chunk_by(|left, right| left.0 == right.0) {
+        for pair in same.windows(2) {
+            for node in pair[0].0 {
+                if is_marked[node as usize] {
+                    slots.join(slot(pair[0].1, node), slot(pair[1].1, node));
+                }
+            }
+        }
+    }
+
+    let mut is_taken = vec![false; is_marked.len()];
+    let mut node_of_group = vec![u32::MAX; 4 * around.len()];
+    let mut copies = 0;
+    for (place, &tetrahedron) in around.iter().enumerate() {
+        for corner in 0..4 {
+            let node = draft.tetrahedra[tetrahedron as usize][corner];
+            if !is_marked.get(node as usize).is_some_and(|&marked| marked) {
+                continue;
+            }
+            let group = slots.root(4 * place as u32 + corner as u32) as usize;
+            if node_of_group[group] == u32::MAX {
+                // The first group keeps the node itself.
+                let is_first = !std::mem::replace(&mut is_taken[node as usize], true);
+                node_of_group[group] = if is_first {
+                    node
+                } else {
+                    copies += 1;
+                    draft.add_node(draft.origins[node as usize])
+                };
+            }
+            draft.tetrahedra[tetrahedron as usize][corner] = node_of_group[group];
+        }
+    }
+    copies
+}
+
+fn sorted(mut face: [u32; 3]) -> [u32; 3] {
+    face.sort_unstable();
+    face
+}
+
+/// Groups of numbers, joined pair by pair.
+struct Groups(Vec<u32>);
+
+impl Groups {
+    fn new(count: usize) -> Self {
+        Self((0..count as u32).collect())
+    }
+
+    fn root(&mut self, mut member: u32) -> u32 {
+        while self.0[member as usize] != member {
+            self.0[member as usize] = self.0[self.0[member as usize] as usize];
+            member = self.0[member as usize];
+        }
+        member
+    }
+
+    fn join(&mut self, left: u32, right: u32) {
+        let (left, right) = (self.root(left), self.root(right));
+        // The smallest is the root, whatever the order.
+        self.0[left.max(right) as usize] = left.min(right);
+    }
+}
