@@ -18,6 +18,7 @@ from palpate.errors import (
     SimulationError,
 )
 from palpate.files import read_mesh, write_mesh
+from palpate.hands import Pull, Tool
 from palpate.mesh import Defect, Mesh
 from palpate.model import Body, Contact, Material, Model, RigidKey, TreeElement, read_model
 from palpate.scene import Scene
@@ -41,6 +42,7 @@ __all__ = [
     "PalpateError",
     "Penetration",
     "Proximity",
+    "Pull",
     "RayHits",
     "RigidKey",
     "Scene",
@@ -48,6 +50,7 @@ __all__ = [
     "SimulationError",
     "Snapshot",
     "StepReport",
+    "Tool",
     "TreeElement",
     "__version__",
     "read_mesh",

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from palpate import _arrays, _core
 from palpate._arrays import Float64Array, IndexArray
 from palpate.contacts import DetectionStats, Intersections
+from palpate.hands import Pull, Tool
 from palpate.mesh import Mesh
 from palpate.model import Body, Model, body_index, read_model
 from palpate.scene import METHODS, SPLITS, _choice
@@ -150,7 +151,7 @@ class Simulation:
 
     @property
     def contact_forces(self) -> tuple[Float64Array, ...]:
-        """Contact force [N] on each node in the last step, per body, shape (n, 3)."""
+        """Force [N] of contacts and springs on each node in the last step, shape (n, 3)."""
         return self._core.contact_forces
 
     @property
@@ -182,6 +183,48 @@ class Simulation:
         """Set external forces [N] on a body's nodes, shape (n, 3); they act until set again."""
         index = self._index(body)
         self._core.set_forces(index, self._points(forces, "forces", index))
+
+    def pull(self, body: int | str, node: int, target: npt.ArrayLike, stiffness: float) -> Pull:
+        """Pull a node towards a target with a spring, as a mouse or a haptic device does.
+
+        Parameters
+        ----------
+        body : int or str
+            The body, by index or name.
+        node : int
+            The node, one that is not fixed.
+        target : (3,)
+            Where the spring ends [m].
+        stiffness : float
+            Force per distance [N/m]. The spring is part of the implicit step: it may be as stiff as
+            wanted.
+
+        Returns
+        -------
+        Pull
+            Move its `Pull.target`, read its `Pull.force`, and `Pull.release` it.
+
+        Examples
+        --------
+        >>> import palpate
+        >>> simulation = palpate.Simulation("small")
+        >>> pull = simulation.pull(0, 5, target=[0, 0, 0.2], stiffness=50.0)
+        >>> report = simulation.step(3)
+        >>> bool(pull.force[2] > 0)
+        True
+        >>> pull.release()
+        """
+        index = self._index(body)
+        node = _arrays.count(node, "node", minimum=0)
+        goal = _arrays.vector(target, "target")
+        identity = self._core.pull(index, node, goal, _arrays.scalar(stiffness, "stiffness"))
+        return Pull(self._core, identity)
+
+    def tool(self, name: int | str) -> Tool:
+        """A rigid body as a tool: move it by `Tool.set_pose`, read its `Tool.force`."""
+        index = self._index(name)
+        self._core.tool_force(index)  # only rigid bodies feel one
+        return Tool(self._core, index, self._names[index])
 
     def intersections(self, *, self_contact: bool = True) -> Intersections:
         """Surface triangles that meet right now; see `Scene.intersections`."""

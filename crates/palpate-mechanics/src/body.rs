@@ -4,16 +4,18 @@ mod elastic;
 mod element;
 mod frame;
 mod inertia;
+mod rigid;
 pub(crate) mod turning;
 
 use glam::DVec3;
 use palpate_geometry::Point;
-use palpate_model::{Body, RigidMotion};
+use palpate_model::{Body, Pose};
 
 use crate::contact::compliance::ComplianceCache;
 use crate::error::MechanicsError;
 use crate::state::BodyState;
 pub(crate) use elastic::ElasticBody;
+pub(crate) use rigid::RigidBody;
 
 /// A body in motion. All arrays have one entry per node.
 pub(crate) struct MovingBody {
@@ -56,7 +58,7 @@ pub(crate) struct Motion {
 
 pub(crate) enum BodyKind {
     Elastic(Box<ElasticBody>),
-    Rigid { rest: Vec<Point>, motion: RigidMotion },
+    Rigid(Box<RigidBody>),
 }
 
 impl MovingBody {
@@ -68,8 +70,8 @@ impl MovingBody {
     ) -> Result<Self, MechanicsError> {
         let nodes = body.mesh.nodes();
         let (kind, compliance) = if let Some(motion) = &body.rigid {
-            let kind = BodyKind::Rigid { rest: nodes.to_vec(), motion: motion.clone() };
-            (kind, ComplianceCache::default())
+            let rigid = RigidBody::new(nodes, motion);
+            (BodyKind::Rigid(Box::new(rigid)), ComplianceCache::default())
         } else {
             let elastic = ElasticBody::new(index, body, gravity, time_step)?;
             let compliance = ComplianceCache::new(&body.mesh);
@@ -102,10 +104,7 @@ impl MovingBody {
                         if elastic.is_free(node) { body.initial_velocity } else { [0.0; 3] };
                 }
             }
-            BodyKind::Rigid { rest, motion } => {
-                let pose = motion.pose(0.0);
-                result.positions = rest.iter().map(|&node| pose.apply(node)).collect();
-            }
+            BodyKind::Rigid(rigid) => rigid.place(0.0, &mut result.positions),
         }
         Ok(result)
     }
@@ -113,7 +112,14 @@ impl MovingBody {
     pub(crate) fn elastic(&self) -> Option<&ElasticBody> {
         match &self.kind {
             BodyKind::Elastic(elastic) => Some(elastic),
-            BodyKind::Rigid { .. } => None,
+            BodyKind::Rigid(_) => None,
+        }
+    }
+
+    pub(crate) fn rigid(&self) -> Option<&RigidBody> {
+        match &self.kind {
+            BodyKind::Elastic(_) => None,
+            BodyKind::Rigid(rigid) => Some(rigid),
         }
     }
 
@@ -136,12 +142,7 @@ impl MovingBody {
                 elastic.predict(&self.positions, &self.velocities, &self.forces, contact);
                 elastic.end_positions(&self.positions, &mut self.expected_positions);
             }
-            BodyKind::Rigid { rest, motion } => {
-                let pose = motion.pose(end);
-                for (node, &rest) in self.expected_positions.iter_mut().zip(&*rest) {
-                    *node = pose.apply(rest);
-                }
-            }
+            BodyKind::Rigid(rigid) => rigid.place(end, &mut self.expected_positions),
         }
         self.motion = self.expected_motion(surface, time_step);
     }
@@ -172,7 +173,7 @@ impl MovingBody {
                 self.compliance.prepare(elastic, nodes, step)
                     + self.compliance.prepare(elastic, &self.expected_nodes, step)
             }
-            BodyKind::Rigid { .. } => 0,
+            BodyKind::Rigid(_) => 0,
         };
     }
 
@@ -180,7 +181,7 @@ impl MovingBody {
     pub(crate) fn prepare_ahead(&mut self, count: usize) -> usize {
         match &mut self.kind {
             BodyKind::Elastic(elastic) => self.compliance.prepare_ahead(elastic, count),
-            BodyKind::Rigid { .. } => 0,
+            BodyKind::Rigid(_) => 0,
         }
     }
 
@@ -203,7 +204,7 @@ impl MovingBody {
                     &mut self.next_velocities,
                 );
             }
-            BodyKind::Rigid { .. } => {
+            BodyKind::Rigid(_) => {
                 self.next_positions.copy_from_slice(&self.expected_positions);
                 for ((velocity, new), old) in self
                     .next_velocities
@@ -237,6 +238,12 @@ impl MovingBody {
         self.elastic().map_or(&[], ElasticBody::stiff_shape)
     }
 
+    pub(crate) fn set_pose(&mut self, pose: Option<Pose>) {
+        if let BodyKind::Rigid(rigid) = &mut self.kind {
+            rigid.pose = pose;
+        }
+    }
+
     /// Goes back to what the response was computed for.
     pub(crate) fn set_shape(&mut self, saved: &BodyState) {
         if let BodyKind::Elastic(elastic) = &mut self.kind
@@ -251,7 +258,7 @@ impl MovingBody {
         std::mem::swap(&mut self.velocities, &mut self.next_velocities);
         self.refactored = match &mut self.kind {
             BodyKind::Elastic(elastic) => elastic.refresh_if_slow(&self.positions),
-            BodyKind::Rigid { .. } => false,
+            BodyKind::Rigid(_) => false,
         };
         if self.refactored {
             self.compliance.clear();

@@ -1,5 +1,7 @@
 //! The bodies in motion: two calls per step, with contact detection by the caller between them.
 
+mod hands;
+
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
@@ -10,12 +12,13 @@ use palpate_solver::FactorStats;
 use rayon::prelude::*;
 
 use crate::body::{BodyKind, MovingBody, first_not_finite};
-use crate::contact::filter::BodyView;
+use crate::contact::filter::{BodyView, Candidate};
 use crate::contact::response::Response;
 use crate::contact::{Contact, ContactParameters, Surface};
 use crate::energy::{Energy, Momentum};
 use crate::error::MechanicsError;
 use crate::state::{BodyState, ContactForce, State};
+use crate::ties::Ties;
 
 /// Motion margin of a search, in mean edges of the finer deformable surface: contacts farther
 /// ahead are found in a later step, or as penetrations.
@@ -112,6 +115,7 @@ pub struct Dynamics {
     surfaces: Vec<Surface>,
     parameters: Vec<ContactParameters>,
     response: Response,
+    ties: Ties,
     start_time: f64,
     start_step: u64,
     step: u64,
@@ -164,6 +168,7 @@ impl Dynamics {
             surfaces: model.bodies.iter().map(|body| Surface::new(&body.mesh)).collect(),
             parameters,
             response: Response::default(),
+            ties: Ties::default(),
             start_time: 0.0,
             start_step: 0,
             step: 0,
@@ -244,9 +249,11 @@ impl Dynamics {
         }
         let (first, second) = (self.body(body_a).motion, self.body(body_b).motion);
         let (margin, limit) = if body_a == body_b {
-            (2.0 * first.deformation, SELF_MARGIN_LIMIT)
+            (2.0 * (first.deformation + self.ties.moved(body_a)), SELF_MARGIN_LIMIT)
         } else {
-            ((first.mean - second.mean).length() + first.spread + second.spread, MARGIN_LIMIT)
+            let pulled = self.ties.moved(body_a) + self.ties.moved(body_b);
+            let apart = (first.mean - second.mean).length();
+            (apart + first.spread + second.spread + pulled, MARGIN_LIMIT)
         };
         Some(a.distance(b) + margin.min(limit * a.soft_edge().min(b.soft_edge())))
     }
@@ -283,6 +290,7 @@ impl Dynamics {
         let time_step = self.options.time_step;
 
         let start = Instant::now();
+        response.begin(|candidates| self.add_ties(candidates));
         response.find(
             proximity,
             penetration,
@@ -300,11 +308,7 @@ impl Dynamics {
         for _ in 0..MAX_PASSES {
             self.solve_contacts(response, &mut stats);
             let start = Instant::now();
-            self.clear_contact_forces();
-            for contact in response.contacts() {
-                let bodies = std::array::from_fn(|corner| contact.body_of(corner));
-                self.add_contact_force(bodies, contact.nodes, contact.weights, contact.force());
-            }
+            self.set_contact_forces(response.forces());
             self.for_each_body(|_, body| body.advance(time_step));
             let missed = response.take_missed(self.body_count(), |body| self.body(body));
             stats.times.advance += start.elapsed();
@@ -331,8 +335,18 @@ impl Dynamics {
         let refactored = (0..self.body_count()).filter(|&body| self.body(body).refactored);
         stats.refactored = refactored.count();
         response.remember();
+        self.ties.finish(response.tie_forces());
         self.step += 1;
         Ok(stats)
+    }
+
+    fn add_ties(&self, candidates: &mut Vec<Candidate>) {
+        let place = |body: u32, node: u32| {
+            let parameters = &self.parameters[body as usize];
+            let position = self.body(body as usize).positions[node as usize];
+            (position, parameters.distance(parameters))
+        };
+        self.ties.add_candidates(place, candidates);
     }
 
     /// One solve for the contact forces of the candidates.
@@ -420,7 +434,7 @@ impl Dynamics {
         &self.body(body).forces
     }
 
-    /// Contact force [N] on each node of a body in the last step.
+    /// Force [N] of contacts and springs on each node of a body in the last step.
     pub fn contact_force(&self, body: usize) -> &[Point] {
         &self.body(body).contact_forces
     }
@@ -477,6 +491,7 @@ impl Dynamics {
                 positions: body.positions.clone(),
                 velocities: body.velocities.clone(),
                 forces: body.forces.clone(),
+                pose: body.rigid().and_then(|rigid| rigid.pose),
                 shape: body.shape(),
                 stiff_shape: body.stiff_shape().to_vec(),
             }
@@ -487,6 +502,7 @@ impl Dynamics {
             clock_start: (self.start_time, self.start_step),
             bodies: bodies.collect(),
             contacts: self.response.last().forces().to_vec(),
+            pulls: self.ties.pulls().to_vec(),
         }
     }
 
@@ -509,6 +525,12 @@ impl Dynamics {
                     check_array(body, count, shape, "the shape")?;
                 }
             }
+            if saved
+                .pose
+                .is_some_and(|pose| !pose.linear.is_finite() || !pose.translation.is_finite())
+            {
+                return Err(MechanicsError::Rotation);
+            }
         }
         let fits = |contact: &ContactForce| {
             let corners = (0..4).all(|corner| {
@@ -520,13 +542,18 @@ impl Dynamics {
         if let Some(index) = state.contacts.iter().position(|contact| !fits(contact)) {
             return Err(MechanicsError::BadContact(index));
         }
+        for pull in &state.pulls {
+            self.check_pull(pull.body as usize, pull.node as usize, pull.target, pull.stiffness)?;
+        }
         for (index, saved) in state.bodies.iter().enumerate() {
             let body = self.body_mut(index);
             body.positions.copy_from_slice(&saved.positions);
             body.velocities.copy_from_slice(&saved.velocities);
             body.forces.copy_from_slice(&saved.forces);
+            body.set_pose(saved.pose);
             body.set_shape(saved);
         }
+        self.ties.restore(&state.pulls);
         self.set_contact_forces(&state.contacts);
         self.response.restore(&state.contacts);
         (self.start_time, self.start_step) = state.clock_start;
@@ -562,7 +589,7 @@ impl Dynamics {
         let body = self.body_mut(body);
         match &mut body.kind {
             BodyKind::Elastic(elastic) => elastic.cauchy_stress(&body.positions),
-            BodyKind::Rigid { .. } => None,
+            BodyKind::Rigid(_) => None,
         }
     }
 

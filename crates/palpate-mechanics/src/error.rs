@@ -102,6 +102,47 @@ pub enum MechanicsError {
         /// Positions, velocities or forces.
         what: &'static str,
     },
+    /// A body that does not exist.
+    #[error("body {index} does not exist: there are {count} bodies, numbered from 0")]
+    NoSuchBody {
+        /// The index that was asked for.
+        index: usize,
+        /// Number of bodies.
+        count: usize,
+    },
+    /// A node that does not exist.
+    #[error("node {node} does not exist: body {body} has {nodes} nodes, numbered from 0")]
+    NoSuchNode {
+        /// Index of the body.
+        body: usize,
+        /// The index that was asked for.
+        node: usize,
+        /// Nodes of the body.
+        nodes: usize,
+    },
+    /// A spring on a node that nothing moves.
+    #[error("node {node} of body {body} is fixed or rigid: it cannot be pulled")]
+    CannotMove {
+        /// Index of the body.
+        body: usize,
+        /// The node.
+        node: usize,
+    },
+    /// A spring that is not stiff.
+    #[error("the stiffness is {0} N/m; expected a positive number")]
+    Stiffness(f64),
+    /// A target or translation with an infinite or undefined component.
+    #[error("a target or translation must be finite")]
+    Target,
+    /// A rotation that turns nothing, not even by nothing.
+    #[error("a rotation must be finite and not zero")]
+    Rotation,
+    /// A spring that is gone.
+    #[error("this was released before, or belongs to another state")]
+    Released,
+    /// A pose for a body that deforms.
+    #[error("body {0} is not rigid, so it cannot be a tool: give it RG fixed in the model")]
+    NotRigid(usize),
     /// A contact of a state that names a body or node that does not exist, or is not finite.
     #[error("contact {0} of the state does not fit the bodies; is it a state of this model?")]
     BadContact(usize),

@@ -11,6 +11,7 @@ mod energy;
 mod error;
 mod materials;
 mod state;
+mod ties;
 mod tissue;
 
 pub use contact::Contact;
@@ -18,4 +19,5 @@ pub use dynamics::{Dynamics, DynamicsOptions, StageTimes, StepStats};
 pub use energy::{Energy, Momentum};
 pub use error::MechanicsError;
 pub use state::{BodyState, ContactForce, State};
+pub use ties::Pull;
 pub use tissue::von_mises;

@@ -1,6 +1,9 @@
 //! What the next step depends on.
 
 use palpate_geometry::Point;
+use palpate_model::Pose;
+
+use crate::ties::Pull;
 
 /// Everything the next step depends on; restoring it continues bit for bit.
 #[derive(Clone, Debug, Default, PartialEq, serde::Deserialize, serde::Serialize)]
@@ -14,8 +17,10 @@ pub struct State {
     pub clock_start: (f64, u64),
     /// The bodies, in model order.
     pub bodies: Vec<BodyState>,
-    /// Contact forces of the last step, where the solver begins.
+    /// Forces of contacts and springs in the last step, where the solver begins.
     pub contacts: Vec<ContactForce>,
+    /// Springs that pull nodes.
+    pub pulls: Vec<Pull>,
 }
 
 /// The force of one contact in the last step.
@@ -49,6 +54,8 @@ pub struct BodyState {
     pub velocities: Vec<Point>,
     /// External forces [N].
     pub forces: Vec<Point>,
+    /// Where a rigid body was put, instead of on the path that the model gives it.
+    pub pose: Option<Pose>,
     /// Shape in the body's frame for which its response to contact was computed last [m]; empty if
     /// it was not.
     pub shape: Vec<Point>,

@@ -1,12 +1,14 @@
 //! `palpate._core.Simulation`: the step loop, its state and its checkpoints.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
+use glam::DQuat;
 use numpy::{PyArray1, PyArray2, PyReadonlyArray2};
 use palpate::contact::{IntersectionOptions, PairKind};
 use palpate::geometry::Point;
-use palpate::mechanics::State;
+use palpate::mechanics::{Pull, State};
 use palpate::{Simulation, SimulationOptions, StepReport, StepTimes};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
@@ -53,6 +55,8 @@ impl PySimulation {
         PyTuple::new(py, arrays)
     }
 }
+
+type Vec3 = (f64, f64, f64);
 
 /// The columns of `palpate.Contacts`.
 type ContactColumns<'py> = (
@@ -168,6 +172,55 @@ impl PySimulation {
         row.set_item("iterations", iterations)?;
         row.set_item("residual", report.mechanics.residual)?;
         Ok(row)
+    }
+
+    fn pull(
+        &self,
+        py: Python<'_>,
+        body: usize,
+        node: usize,
+        target: Vec3,
+        stiffness: f64,
+    ) -> PyResult<u64> {
+        raise(py, self.lock().pull(body, node, target.into(), stiffness))
+    }
+
+    fn set_pull_target(&self, py: Python<'_>, pull: u64, target: Vec3) -> PyResult<()> {
+        raise(py, self.lock().set_pull_target(pull, target.into()))
+    }
+
+    fn release(&self, py: Python<'_>, pull: u64) -> PyResult<()> {
+        raise(py, self.lock().release(pull))
+    }
+
+    /// Body, node, target, stiffness and force of each spring by what it is called by.
+    fn pulls(&self) -> BTreeMap<u64, (u32, u32, Vec3, f64, Vec3)> {
+        let row = |p: &Pull| (p.id, (p.body, p.node, p.target.into(), p.stiffness, p.force.into()));
+        self.lock().pulls().iter().map(row).collect()
+    }
+
+    /// Puts a rigid body; `rotation` is a unit quaternion, real part first.
+    fn set_pose(
+        &self,
+        py: Python<'_>,
+        body: usize,
+        rotation: (f64, f64, f64, f64),
+        translation: Vec3,
+    ) -> PyResult<()> {
+        let (w, x, y, z) = rotation;
+        let rotation = DQuat::from_xyzw(x, y, z, w);
+        raise(py, self.lock().set_pose(body, rotation, translation.into()))
+    }
+
+    /// Columns of the rotation, and the translation.
+    fn tool_pose(&self, py: Python<'_>, body: usize) -> PyResult<([[f64; 3]; 3], [f64; 3])> {
+        let (rotation, translation) = raise(py, self.lock().tool_pose(body))?;
+        Ok((rotation.to_cols_array_2d(), translation.to_array()))
+    }
+
+    fn tool_force(&self, py: Python<'_>, body: usize) -> PyResult<(Vec3, Vec3)> {
+        let [force, torque] = raise(py, self.lock().tool_force(body))?;
+        Ok((force.into(), torque.into()))
     }
 
     fn set_positions(

@@ -1,5 +1,7 @@
 //! The step loop: detect, respond, move.
 
+mod hands;
+
 use std::ops::AddAssign;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -211,7 +213,7 @@ impl Simulation {
         self.dynamics.contacts()
     }
 
-    /// Contact force [N] on each node of a body in the last step.
+    /// Force [N] of contacts and springs on each node of a body in the last step.
     pub fn contact_force(&self, body: usize) -> &[Point] {
         self.dynamics.contact_force(body)
     }

@@ -45,6 +45,9 @@ pub(crate) struct Candidate {
     /// Largest gap at the end of the step that the contact may push to [m].
     pub(crate) recovery: f64,
     pub(crate) friction: f64,
+    /// For a tie: from where side a should be to where it is at the start of the step [m]. A tie works
+    /// against that in every direction with its stiffness; gap, recovery and friction do not count.
+    pub(crate) tied: Option<DVec3>,
 }
 
 /// What the filter sees of one body.
@@ -76,7 +79,7 @@ pub(crate) struct Filter {
 }
 
 impl Filter {
-    /// Writes the candidates of this step, in the order of the pairs, then of the penetrations.
+    /// Adds the contact candidates of this step, in the order of the pairs, then of the penetrations.
     pub(crate) fn run<'a>(
         &mut self,
         proximity: &[ProximityPair],
@@ -88,7 +91,6 @@ impl Filter {
         self.inside.clear();
         self.inside.extend(penetration.iter().map(|p| (p.body, p.node, p.into_body)));
         self.inside.sort_unstable();
-        candidates.clear();
         for pair in proximity {
             let bodies = pair.bodies.map(&view);
             if bodies[0].parameters.rigid && bodies[1].parameters.rigid {
@@ -137,7 +139,7 @@ impl Filter {
     fn drop_twins(&mut self, candidates: &mut Vec<Candidate>) {
         self.by_node.clear();
         for (index, c) in candidates.iter().enumerate() {
-            if c.kind == PairKind::VertexTriangle {
+            if c.kind == PairKind::VertexTriangle && c.tied.is_none() {
                 self.by_node.push((c.bodies[0], c.nodes[0], c.bodies[1], index as u32));
             }
         }
@@ -298,5 +300,6 @@ fn candidate(
         stiffness: share * area * a.stiffness(b),
         recovery: gap + distance * time_step / RECOVERY_TIME,
         friction: a.friction(b),
+        tied: None,
     }
 }

@@ -3,7 +3,6 @@
 use glam::DVec3;
 use palpate_contact::PairKind;
 
-use super::Contact;
 use super::filter::Candidate;
 use crate::state::ContactForce;
 
@@ -21,18 +20,6 @@ fn key(force: &ContactForce) -> (bool, [u32; 2], [u32; 4]) {
 }
 
 impl LastForces {
-    pub(crate) fn take(&mut self, contacts: &[Contact]) {
-        self.forces.clear();
-        self.forces.extend(contacts.iter().map(|contact| ContactForce {
-            edges: contact.kind == PairKind::EdgeEdge,
-            bodies: contact.bodies,
-            nodes: contact.nodes,
-            weights: contact.weights,
-            force: contact.force(),
-        }));
-        self.sort();
-    }
-
     pub(crate) fn restore(&mut self, forces: &[ContactForce]) {
         self.forces.clear();
         self.forces.extend_from_slice(forces);

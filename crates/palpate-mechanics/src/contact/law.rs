@@ -1,9 +1,13 @@
-//! What one contact asks for: its normal force by its gap, its friction by its slip.
+//! What one contact asks for: its normal force by its gap, its friction by its slip; what a tie asks
+//! for.
+
+mod tie;
 
 use glam::{DVec2, DVec3, Vec3Swizzles};
 
 use super::filter::Candidate;
 use super::problem::Block;
+use tie::TieLaw;
 
 /// Part of the contact distance in which the penalty is soft. Below it, and where the recovery is
 /// limited, a contact is [`HARDENING`] times stiffer: surfaces must not pass through each other even
@@ -24,9 +28,50 @@ struct Piece {
     stiffness: f64,
 }
 
+/// What a candidate asks for, given what it does to itself.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Law {
+    Contact(ContactLaw),
+    Tie(TieLaw),
+}
+
+impl Law {
+    pub(super) fn new(candidate: &Candidate, block: &Block) -> Self {
+        match candidate.tied {
+            Some(offset) => Self::Tie(TieLaw::new(offset, candidate, block)),
+            None => Self::Contact(ContactLaw::new(candidate, block)),
+        }
+    }
+
+    /// Nearest force that can be carried.
+    pub(super) fn admissible(&self, force: DVec3) -> DVec3 {
+        match self {
+            Self::Contact(law) => law.admissible(force),
+            Self::Tie(_) => force,
+        }
+    }
+
+    /// Force that the law asks for while all others stay as they are; `moved` is the displacement by
+    /// all forces.
+    pub(super) fn answer(&self, force: DVec3, moved: DVec3) -> DVec3 {
+        match self {
+            Self::Contact(law) => law.answer(force, moved),
+            Self::Tie(law) => law.answer(force, moved),
+        }
+    }
+
+    /// How far the force is from obeying the law, in contact distances.
+    pub(super) fn violation(&self, force: DVec3, moved: DVec3) -> f64 {
+        match self {
+            Self::Contact(law) => law.violation(force, moved),
+            Self::Tie(law) => law.violation(force, moved),
+        }
+    }
+}
+
 /// The laws of one contact, given what it does to itself.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Law {
+pub(super) struct ContactLaw {
     /// Penalty by the overlap; the steeper one of a deep overlap; as hard as it takes to reach the
     /// recovery gap, which is less than the penalty.
     pieces: [Piece; 3],
@@ -41,8 +86,8 @@ pub(super) struct Law {
     distance: f64,
 }
 
-impl Law {
-    pub(super) fn new(candidate: &Candidate, block: &Block) -> Self {
+impl ContactLaw {
+    fn new(candidate: &Candidate, block: &Block) -> Self {
         let hard = HARDENING * candidate.stiffness;
         let soft_part = SOFT_PART * candidate.distance;
         let own = block.own;
@@ -72,7 +117,7 @@ impl Law {
     }
 
     /// Nearest force that the contact can carry.
-    pub(super) fn admissible(&self, force: DVec3) -> DVec3 {
+    fn admissible(&self, force: DVec3) -> DVec3 {
         let normal = force.x.max(0.0);
         let friction = force.yz().clamp_length_max(self.friction * normal);
         DVec3::new(normal, friction.x, friction.y)
@@ -80,7 +125,7 @@ impl Law {
 
     /// Force that the laws ask for while all others stay as they are; `moved` is the displacement of
     /// the contact by all forces.
-    pub(super) fn answer(&self, force: DVec3, moved: DVec3) -> DVec3 {
+    fn answer(&self, force: DVec3, moved: DVec3) -> DVec3 {
         let others = moved.x - self.pressed * force.x;
         let [elastic, hard, recovering] = self.pieces.map(|p| (p.target - others) * p.stiffness);
         let normal = elastic.max(hard).min(recovering).max(0.0);
@@ -96,7 +141,7 @@ impl Law {
     /// How far the contact is from obeying its laws, in contact distances: by what its gap differs
     /// from the one that its normal force belongs to, or it slips though its friction could be larger
     /// or point elsewhere.
-    pub(super) fn violation(&self, force: DVec3, moved: DVec3) -> f64 {
+    fn violation(&self, force: DVec3, moved: DVec3) -> f64 {
         let [elastic, hard, recovering] =
             self.pieces.map(|p| p.target - moved.x - p.softness * force.x);
         let gap = elastic.max(hard).min(recovering);

@@ -1,7 +1,7 @@
 //! The contact stage of a step: candidates, forces, and the contacts that are reported.
 
 use glam::DVec3;
-use palpate_contact::{PenetratingNode, ProximityPair};
+use palpate_contact::{PairKind, PenetratingNode, ProximityPair};
 
 use super::Contact;
 use super::filter::{BodyView, Candidate, Filter};
@@ -27,13 +27,23 @@ pub(crate) struct Response {
     problem: Problem,
     solver: GaussSeidel,
     contacts: Vec<Contact>,
+    /// Forces on all that the step has: contacts, and the ties, which come first among the candidates.
+    forces: Vec<ContactForce>,
+    ties: usize,
     last: LastForces,
     /// Forces found so far in this step, where the solve begins.
     guess: LastForces,
 }
 
 impl Response {
-    /// Finds this step's candidates and the nodes they touch.
+    /// Begins a step with the ties that `add` writes.
+    pub(crate) fn begin(&mut self, add: impl FnOnce(&mut Vec<Candidate>)) {
+        self.candidates.clear();
+        add(&mut self.candidates);
+        self.ties = self.candidates.len();
+    }
+
+    /// Finds the contact candidates of the step that has begun, and the nodes that it moves.
     pub(crate) fn find<'a>(
         &mut self,
         proximity: &[ProximityPair],
@@ -48,6 +58,9 @@ impl Response {
         self.spare.clear();
         let spare = &mut self.spare;
         self.candidates.retain(|candidate| {
+            if candidate.tied.is_some() {
+                return true;
+            }
             let moved = candidate.normal.dot(expected_displacement(candidate, &body));
             let close = candidate.gap.min(candidate.gap + moved) < CLOSE * candidate.distance;
             if !close {
@@ -80,14 +93,25 @@ impl Response {
         if self.candidates.len() == known {
             return false;
         }
-        self.guess.take(&self.contacts);
+        self.guess.restore(&self.forces);
         self.problem.collect(&self.candidates, body_count, &body);
         self.contacts.clear();
         true
     }
 
+    /// Possible contacts.
     pub(crate) fn candidate_count(&self) -> usize {
-        self.candidates.len()
+        self.candidates.len() - self.ties
+    }
+
+    /// Forces of contacts and ties that the step has found.
+    pub(crate) fn forces(&self) -> &[ContactForce] {
+        &self.forces
+    }
+
+    /// Force [N] of each tie on its side a, in the order in which they were added.
+    pub(crate) fn tie_forces(&self) -> impl Iterator<Item = DVec3> {
+        self.forces[..self.ties].iter().map(|tie| DVec3::from_array(tie.force))
     }
 
     pub(crate) fn problem(&self) -> &Problem {
@@ -105,6 +129,7 @@ impl Response {
         body: impl Fn(usize) -> &'a MovingBody + Sync,
     ) -> SolveCost {
         if self.candidates.is_empty() {
+            self.forces.clear();
             return SolveCost::default();
         }
         self.problem.assemble(&self.candidates, pool, &body);
@@ -120,8 +145,20 @@ impl Response {
 
     fn report<'a>(&mut self, body: impl Fn(usize) -> &'a MovingBody) {
         let blocks = self.problem.blocks();
+        self.forces.clear();
         for (index, (candidate, block)) in self.candidates.iter().zip(blocks).enumerate() {
             let force = self.solver.force(index);
+            let mut found = ContactForce {
+                edges: candidate.kind == PairKind::EdgeEdge,
+                bodies: candidate.bodies,
+                nodes: candidate.nodes,
+                weights: candidate.weights,
+                force: (block.axes * force).to_array(),
+            };
+            if candidate.tied.is_some() {
+                self.forces.push(found);
+                continue;
+            }
             if force.x <= 0.0 {
                 continue;
             }
@@ -132,7 +169,7 @@ impl Response {
                 point += 0.5 * candidate.weights[corner].abs() * DVec3::from_array(position);
             }
             let friction = block.axes * DVec3::new(0.0, force.y, force.z);
-            self.contacts.push(Contact {
+            let contact = Contact {
                 kind: candidate.kind,
                 bodies: candidate.bodies,
                 nodes: candidate.nodes,
@@ -142,13 +179,16 @@ impl Response {
                 gap: candidate.gap + block.free.x + self.solver.moved(&self.problem, block).x,
                 normal_force: force.x,
                 friction_force: friction.to_array(),
-            });
+            };
+            found.force = contact.force();
+            self.forces.push(found);
+            self.contacts.push(contact);
         }
     }
 
     /// Keeps the forces of the step that ends for the next one.
     pub(crate) fn remember(&mut self) {
-        self.last.take(&self.contacts);
+        self.last.restore(&self.forces);
     }
 
     /// Forces of the last step.

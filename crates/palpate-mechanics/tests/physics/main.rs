@@ -6,6 +6,7 @@ mod elasticity;
 mod errors;
 mod free_motion;
 mod friction;
+mod hands;
 mod impact;
 mod nonlinear;
 mod world;

@@ -1,0 +1,123 @@
+//! Springs that pull nodes to a place: what a mouse or a haptic device holds tissue with.
+
+use glam::DVec3;
+use palpate_contact::PairKind;
+use palpate_geometry::Point;
+
+use crate::contact::filter::Candidate;
+
+/// A spring from a node to a target.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Deserialize, serde::Serialize)]
+pub struct Pull {
+    /// Tells it from all other pulls of the simulation.
+    pub id: u64,
+    /// The body, and the node of it, that is pulled.
+    pub body: u32,
+    /// The node.
+    pub node: u32,
+    /// Where the spring ends [m].
+    pub target: Point,
+    /// Force per distance [N/m].
+    pub stiffness: f64,
+    /// Force on the node in the last step [N].
+    pub force: Point,
+    /// How far the target has moved since the last step [m]: contacts are looked for as far ahead.
+    pub moved: f64,
+}
+
+/// All springs of a simulation, in the order in which they were made.
+#[derive(Debug, Default)]
+pub(crate) struct Ties {
+    pulls: Vec<Pull>,
+    next_id: u64,
+}
+
+impl Ties {
+    pub(crate) fn pulls(&self) -> &[Pull] {
+        &self.pulls
+    }
+
+    /// Adds a spring to a node that is at `position`; returns its identity.
+    pub(crate) fn pull(
+        &mut self,
+        (body, node): (u32, u32),
+        position: Point,
+        target: Point,
+        stiffness: f64,
+    ) -> u64 {
+        let id = self.next_id;
+        self.next_id += 1;
+        let moved = distance(position, target);
+        self.pulls.push(Pull { id, body, node, target, stiffness, force: [0.0; 3], moved });
+        id
+    }
+
+    pub(crate) fn find(&mut self, id: u64) -> Option<&mut Pull> {
+        self.pulls.iter_mut().find(|pull| pull.id == id)
+    }
+
+    pub(crate) fn set_target(&mut self, id: u64, target: Point) -> bool {
+        let Some(pull) = self.find(id) else { return false };
+        pull.moved += distance(pull.target, target);
+        pull.target = target;
+        true
+    }
+
+    pub(crate) fn release(&mut self, id: u64) -> bool {
+        let count = self.pulls.len();
+        self.pulls.retain(|pull| pull.id != id);
+        self.pulls.len() < count
+    }
+
+    /// Goes back to other springs; new ones will not have an identity that was used before.
+    pub(crate) fn restore(&mut self, pulls: &[Pull]) {
+        self.pulls.clear();
+        self.pulls.extend_from_slice(pulls);
+        let used = pulls.iter().map(|pull| pull.id + 1).max().unwrap_or(0);
+        self.next_id = self.next_id.max(used);
+    }
+
+    /// How far targets of a body's springs have moved since the last step, at most [m].
+    pub(crate) fn moved(&self, body: usize) -> f64 {
+        let pulls = self.pulls.iter().filter(|pull| pull.body as usize == body);
+        pulls.map(|pull| pull.moved).fold(0.0, f64::max)
+    }
+
+    /// Adds the springs to the candidates of a step; `place` gives the position of a node and the
+    /// contact distance of its body.
+    pub(crate) fn add_candidates(
+        &self,
+        place: impl Fn(u32, u32) -> (Point, f64),
+        candidates: &mut Vec<Candidate>,
+    ) {
+        candidates.extend(self.pulls.iter().map(|pull| {
+            let (position, distance) = place(pull.body, pull.node);
+            let offset = DVec3::from_array(position) - DVec3::from_array(pull.target);
+            Candidate {
+                kind: PairKind::VertexTriangle,
+                bodies: [pull.body; 2],
+                nodes: [pull.node; 4],
+                weights: [1.0, 0.0, 0.0, 0.0],
+                normal: offset.try_normalize().unwrap_or(DVec3::X),
+                gap: 0.0,
+                distance,
+                stiffness: pull.stiffness,
+                recovery: 0.0,
+                friction: 0.0,
+                tied: Some(offset),
+            }
+        }));
+    }
+
+    /// Keeps the forces of the step that ends, one per spring [N].
+    pub(crate) fn finish(&mut self, forces: impl Iterator<Item = DVec3>) {
+        for (pull, force) in self.pulls.iter_mut().zip(forces) {
+            pull.force = force.to_array();
+            pull.moved = 0.0;
+        }
+    }
+}
+
+fn distance(a: Point, b: Point) -> f64 {
+    DVec3::from_array(a).distance(DVec3::from_array(b))
+}

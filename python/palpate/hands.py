@@ -1,0 +1,190 @@
+"""What a user's hands do in a simulation: pull tissue by springs, move rigid tools."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from palpate import _arrays, _core
+from palpate._arrays import Float64Array
+
+# How far the columns of a rotation matrix may be off right angles and length 1.
+_ROTATION_TOLERANCE = 1e-6
+
+
+class _State(NamedTuple):
+    body: int
+    node: int
+    target: tuple[float, float, float]
+    stiffness: float
+    force: tuple[float, float, float]
+
+
+class Pull:
+    """A spring that pulls a node towards a target, made by `Simulation.pull`.
+
+    It is part of the simulation's state: after `Simulation.restore` or `Simulation.reset` to a
+    state without it, it is released.
+    """
+
+    def __init__(self, core: _core.Simulation, identity: int) -> None:
+        self._core = core
+        self._id = identity
+
+    def _state(self) -> _State:
+        pulls = self._core.pulls()
+        if self._id not in pulls:
+            raise ValueError("this was released before, or belongs to another state")
+        return _State(*pulls[self._id])
+
+    @property
+    def is_active(self) -> bool:
+        """Whether it still pulls."""
+        return self._id in self._core.pulls()
+
+    @property
+    def body(self) -> int:
+        """Index of the body that is pulled."""
+        return self._state().body
+
+    @property
+    def node(self) -> int:
+        """Node that is pulled."""
+        return self._state().node
+
+    @property
+    def stiffness(self) -> float:
+        """Force per distance [N/m]."""
+        return self._state().stiffness
+
+    @property
+    def target(self) -> Float64Array:
+        """Where the spring ends [m], shape (3,); may be set at any time."""
+        return np.array(self._state().target)
+
+    @target.setter
+    def target(self, target: npt.ArrayLike) -> None:
+        self._core.set_pull_target(self._id, _arrays.vector(target, "target"))
+
+    @property
+    def force(self) -> Float64Array:
+        """Force on the node in the last step [N], shape (3,)."""
+        return np.array(self._state().force)
+
+    def release(self) -> None:
+        """Let go."""
+        self._core.release(self._id)
+
+    def __repr__(self) -> str:
+        if not self.is_active:
+            return "Pull(released)"
+        state = self._state()
+        return f"Pull(body {state.body}, node {state.node}, {state.stiffness:g} N/m)"
+
+
+class Tool:
+    """A rigid body that the user moves, got by `Simulation.tool`.
+
+    Without `set_pose` it rests, or follows the path of its model (RG).
+    """
+
+    def __init__(self, core: _core.Simulation, index: int, name: str) -> None:
+        self._core = core
+        self._index = index
+        self._name = name
+
+    @property
+    def name(self) -> str:
+        """Name of the body."""
+        return self._name
+
+    def set_pose(self, rotation: npt.ArrayLike, translation: npt.ArrayLike) -> None:
+        """Move the tool to a pose during the next step.
+
+        Parameters
+        ----------
+        rotation : (3, 3) or (4,)
+            Rotation matrix, or quaternion with the real part first: how the tool is turned from how
+            the model placed it.
+        translation : (3,)
+            Where the origin of its mesh file is [m].
+
+        Raises
+        ------
+        ValueError
+            If the rotation is none, or a number is not finite.
+
+        Notes
+        -----
+        A tool should move by less than a few surface edges of the tissue in a step: contacts are
+        looked for three edges ahead.
+        """
+        quaternion = _quaternion(rotation)
+        self._core.set_pose(self._index, quaternion, _arrays.vector(translation, "translation"))
+
+    @property
+    def rotation(self) -> Float64Array:
+        """How it is turned from how the model placed it, shape (3, 3)."""
+        columns: Float64Array = np.array(self._core.tool_pose(self._index)[0])
+        return np.ascontiguousarray(columns.T)
+
+    @property
+    def translation(self) -> Float64Array:
+        """Where the origin of its mesh file is [m], shape (3,)."""
+        return np.array(self._core.tool_pose(self._index)[1])
+
+    @property
+    def force(self) -> Float64Array:
+        """Force of all contacts on the tool in the last step [N], shape (3,)."""
+        return np.array(self._core.tool_force(self._index)[0])
+
+    @property
+    def torque(self) -> Float64Array:
+        """Torque of all contacts on the tool [N m] about its `translation`, shape (3,)."""
+        return np.array(self._core.tool_force(self._index)[1])
+
+    def __repr__(self) -> str:
+        return f"Tool({self._name!r})"
+
+
+def _quaternion(rotation: npt.ArrayLike) -> tuple[float, float, float, float]:
+    """A rotation matrix or quaternion as a unit quaternion, real part first."""
+    array = np.asarray(rotation)
+    if array.dtype.kind not in "fiu":
+        raise TypeError(f"rotation: expected numbers, got dtype {array.dtype}")
+    array = array.astype(np.float64)
+    if not np.isfinite(array).all():
+        raise ValueError("rotation: expected finite numbers")
+    if array.shape == (4,):
+        length = float(np.linalg.norm(array))
+        if abs(length - 1) > 1e-3:
+            raise ValueError(f"rotation: expected a quaternion of length 1, got length {length:g}")
+        w, x, y, z = (float(entry) for entry in array / length)
+        return w, x, y, z
+    if array.shape != (3, 3):
+        raise ValueError(f"rotation: expected shape (3, 3) or (4,), got {array.shape}")
+    off = float(np.abs(array @ array.T - np.eye(3)).max())
+    if off > _ROTATION_TOLERANCE or np.linalg.det(array) < 0:
+        raise ValueError(
+            "rotation: expected a rotation matrix; its columns are not at right angles, not of "
+            "length 1, or mirror"
+        )
+    # The largest of the four squares first (Shepperd 1978): no division by a small number.
+    trace = float(np.trace(array))
+    squares = np.array([trace, array[0, 0], array[1, 1], array[2, 2]])
+    largest = int(squares.argmax())
+    if largest == 0:
+        axial = [array[2, 1] - array[1, 2], array[0, 2] - array[2, 0], array[1, 0] - array[0, 1]]
+        parts = np.array([1 + trace, *axial])
+    else:
+        i = largest - 1
+        j, k = (i + 1) % 3, (i + 2) % 3
+        parts = np.empty(4)
+        parts[0] = array[k, j] - array[j, k]
+        parts[1 + i] = 1 + 2 * array[i, i] - trace
+        parts[1 + j] = array[j, i] + array[i, j]
+        parts[1 + k] = array[k, i] + array[i, k]
+    w, x, y, z = (float(entry) for entry in parts / np.linalg.norm(parts))
+    return w, x, y, z
