@@ -1,0 +1,1 @@
+"""Is it right: the mechanics beside exact solutions, through the public API alone."""
