@@ -14,7 +14,7 @@ import palpate
 from palpate.cli import app
 from palpate.cli.format import has_comments
 
-COMMANDS = ("check", "tree", "detect", "simulate", "convert", "format")
+COMMANDS = ("check", "tree", "detect", "simulate", "mesh", "convert", "format")
 
 
 def run(*arguments, status=0):

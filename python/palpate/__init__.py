@@ -20,6 +20,7 @@ from palpate.errors import (
 from palpate.files import read_mesh, write_mesh
 from palpate.hands import Pull, Tool
 from palpate.mesh import Defect, Mesh
+from palpate.meshing import label_surface, mesh_image, mesh_surface
 from palpate.model import Body, Contact, Material, Model, RigidKey, TreeElement, read_model
 from palpate.scene import Scene
 from palpate.simulation import Contacts, Simulation, Snapshot, StepReport
@@ -53,6 +54,9 @@ __all__ = [
     "Tool",
     "TreeElement",
     "__version__",
+    "label_surface",
+    "mesh_image",
+    "mesh_surface",
     "read_mesh",
     "read_model",
     "write_mesh",

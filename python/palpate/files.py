@@ -134,6 +134,11 @@ def _from_meshio(raw: Any, repair: bool) -> Mesh:
     )
     if merged:
         notes.append(f"{merged} points at equal positions merged")
+        a, b, c = elements.T
+        flat = (a == b) | (b == c) | (c == a)
+        if flat.any():
+            notes.append(f"{int(flat.sum())} triangles of merged points left out")
+            elements = elements[~flat]
     points, elements, unused, kept = _drop_unused(points, elements)
     if unused:
         notes.append(f"{unused} points that no element uses left out")

@@ -13,6 +13,7 @@ from palpate.cli.check import check
 from palpate.cli.convert import convert
 from palpate.cli.detect import detect
 from palpate.cli.format import format_file
+from palpate.cli.mesh import mesh
 from palpate.cli.output import reporting
 from palpate.cli.simulate import simulate
 from palpate.cli.tree import tree
@@ -53,6 +54,7 @@ for _name, _command in (
     ("detect", detect),
     ("simulate", simulate),
     ("tune", tune),
+    ("mesh", mesh),
     ("convert", convert),
     ("format", format_file),
 ):

@@ -24,3 +24,20 @@ def mean_ratios(nodes: Float64Array, tetrahedra: IndexArray) -> Float64Array:
         np.sum((corners[:, a] - corners[:, b]) ** 2, axis=1) for a in range(4) for b in range(a)
     )
     return np.asarray(np.sign(volumes) * 12 * np.cbrt(3 * np.abs(volumes)) ** 2 / squares)
+
+
+def dihedral_angles(nodes: Float64Array, tetrahedra: IndexArray) -> Float64Array:
+    """Angle [degrees] between the faces at each edge of each tetrahedron, shape (m, 6).
+
+    A regular tetrahedron has 70.5; small and large ones make a matrix ill-conditioned.
+    """
+    corners = nodes[tetrahedra]
+    columns = []
+    for a, b in ((0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)):
+        c, d = (each for each in range(4) if each not in (a, b))
+        edge = corners[:, b] - corners[:, a]
+        first = np.cross(edge, corners[:, c] - corners[:, a])
+        second = np.cross(edge, corners[:, d] - corners[:, a])
+        across = np.linalg.norm(np.cross(first, second), axis=1)
+        columns.append(np.degrees(np.arctan2(across, np.sum(first * second, axis=1))))
+    return np.stack(columns, axis=1)
