@@ -258,6 +258,19 @@ impl Blade {
         sheets.iter().flatten().copied()
     }
 
+    /// The parts that cut one after the other, each as a blade: separate, branching or folded back sheets.
+    pub fn parts(&self) -> Vec<Self> {
+        match &self.0 {
+            Shape::Surface { points, sheets } => {
+                let part = |sheet: &Vec<[u32; 3]>| {
+                    Self(Shape::Surface { points: points.clone(), sheets: vec![sheet.clone()] })
+                };
+                sheets.iter().map(part).collect()
+            }
+            Shape::Plane { .. } => vec![self.clone()],
+        }
+    }
+
     /// The box around the surface; all of space for a whole plane.
     pub fn bounds(&self) -> Aabb {
         match &self.0 {

@@ -2,7 +2,7 @@
 
 use palpate_geometry::{
     Aabb, Point, intersection::segment_triangle_intersect, predicates::orient2d,
-    predicates::orient3d, vec3,
+    predicates::orient3d, predicates::orient3d_each, vec3,
 };
 use palpate_model::TETRAHEDRON_FACES;
 
@@ -70,10 +70,13 @@ enum Meeting {
 }
 
 fn meeting(corners: &[Point; 4], triangle: &[Point; 3], normal: Point) -> Meeting {
-    let &[a, b, c] = triangle;
-    let signs = corners.map(|corner| orient3d(a, b, c, corner));
-    if signs.contains(&1) && signs.contains(&-1) {
+    let signs = orient3d_each(triangle, corners);
+    let [least, most] = [signs.iter().min(), signs.iter().max()];
+    if least == Some(&-1) && most == Some(&1) {
         return if passes_inside(corners, triangle) { Meeting::Inside } else { Meeting::None };
+    }
+    if signs.iter().filter(|&&sign| sign == 0).count() < 3 {
+        return Meeting::None;
     }
     for (face, nodes) in TETRAHEDRON_FACES.iter().enumerate() {
         if nodes.iter().all(|&corner| signs[corner] == 0)

@@ -226,7 +226,9 @@ struct Shape<'a> {
     /// Rest positions of the corners, then of the points of the edges.
     points: [Point; 10],
     /// Parts below this quality are slivers: the bound, or the whole's own where that is lower.
-    bound: f64,
+    min_quality: f64,
+    /// Parts have no shorter edges: the square of the bound, or the whole's own where that is smaller.
+    min_edge_squared: f64,
 }
 
 impl<'a> Shape<'a> {
@@ -239,11 +241,18 @@ impl<'a> Shape<'a> {
         for (place, &edge) in star.edges().iter().enumerate() {
             points[4 + place] = splits[edge as usize].rest;
         }
-        let whole = tetrahedron::radius_ratio(&[points[0], points[1], points[2], points[3]]);
-        Self { splits, star, nodes, points, bound: options.min_quality.min(whole) }
+        let whole = [points[0], points[1], points[2], points[3]];
+        Self {
+            splits,
+            star,
+            nodes,
+            points,
+            min_quality: options.min_quality.min(tetrahedron::radius_ratio(&whole)),
+            min_edge_squared: options.min_edge.powi(2).min(shortest_edge_squared(&whole)),
+        }
     }
 
-    /// Whether all parts that the edges accepted by `is_live` make are positive and no slivers.
+    /// Whether all parts that the edges accepted by `is_live` make are positive, no slivers and not too small.
     fn is_good(&self, is_live: &impl Fn(&Split) -> bool) -> bool {
         let corner = |node: u32| {
             self.nodes.iter().position(|&other| other == node).expect("an edge of it") as u8
@@ -263,8 +272,14 @@ impl<'a> Shape<'a> {
         }
         Parts::new(&live[..count]).as_slice().iter().all(|part| {
             let corners = part.map(|corner| self.points[corner as usize]);
-            tetrahedron::radius_ratio(&corners) >= self.bound
+            tetrahedron::radius_ratio(&corners) >= self.min_quality
+                && shortest_edge_squared(&corners) >= self.min_edge_squared
                 && tetrahedron::orientation(&corners) > 0
         })
     }
+}
+
+fn shortest_edge_squared(&[a, b, c, d]: &[Point; 4]) -> f64 {
+    let edges = [(a, b), (a, c), (a, d), (b, c), (b, d), (c, d)];
+    edges.iter().map(|&(from, to)| vec3::distance_squared(from, to)).fold(f64::INFINITY, f64::min)
 }

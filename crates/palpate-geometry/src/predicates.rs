@@ -34,6 +34,13 @@ pub fn orient3d(a: Point, b: Point, c: Point, d: Point) -> i8 {
     Plane::new(&[a, b, c]).side(d)
 }
 
+/// [`orient3d`] of a triangle with each of several points, computing what they have in common once.
+#[inline]
+pub fn orient3d_each<const N: usize>(triangle: &[Point; 3], points: &[Point; N]) -> [i8; N] {
+    let plane = Plane::new(triangle);
+    points.map(|point| plane.side(point))
+}
+
 /// The sign of the area of the triangle (`a`, `b`, `c`): +1 counter-clockwise, 0 exactly
 /// collinear, -1 clockwise.
 #[inline]
@@ -166,6 +173,7 @@ mod tests {
             let [a, b, c, d] = CORNERS.map(|corner| vec3::scale(corner, factor));
             assert_eq!(orient3d(a, b, c, d), 1, "2^{exponent}");
             assert_eq!(orient3d(b, a, c, d), -1, "2^{exponent}");
+            assert_eq!(orient3d_each(&[b, a, c], &[a, d]), [0, -1], "2^{exponent}");
             assert_eq!(orient2d([0.0, 0.0], [factor, 0.0], [0.0, factor]), 1, "2^{exponent}");
         }
     }

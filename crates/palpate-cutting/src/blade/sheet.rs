@@ -3,7 +3,7 @@
 use palpate_geometry::{Aabb, Point, point_triangle, predicates::orient3d, vec3};
 
 /// Most triangles in a leaf of the tree of boxes.
-const LEAF: usize = 4;
+const LEAF: usize = 1;
 
 /// How far from the smallest squared distance another triangle counts as closest as well: it shares the
 /// closest edge or point, and its distance differs by rounding only.

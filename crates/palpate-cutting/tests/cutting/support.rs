@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use palpate_cutting::{Cut, CutOptions};
+use palpate_cutting::{Blade, Cut, CutOptions, cut};
 use palpate_geometry::{Point, tetrahedron, vec3};
 use palpate_model::{Mesh, MeshData, NodeOrigin};
 
@@ -71,14 +71,35 @@ impl Random {
     }
 }
 
-/// Everything that must hold between a mesh and its cut, whatever the blade.
-pub(crate) fn check_cut(old: &Mesh, positions: &[Point], cut: &Cut, options: &CutOptions) {
-    let change = &cut.change;
-    let new = &change.mesh;
-    check_origins(old, positions, cut);
-    check_parts(old, cut, options);
-    check_conformity(old, cut);
+/// Cuts, and checks everything that must hold whatever the blade. The parts of a blade are checked one after the other
+/// as well: the later ones may split a lip that an earlier one left, so that what they leave together has
+/// lips that are no images of each other.
+pub(crate) fn checked_cut(
+    old: &Mesh,
+    positions: &[Point],
+    blade: &Blade,
+    options: &CutOptions,
+) -> Option<Cut> {
+    let done = cut(old, positions, blade, options).unwrap()?;
+    check_origins(old, positions, &done);
+    check_parts(old, &done, options);
+    check_report(old, &done);
+    let parts = blade.parts();
+    if parts.len() == 1 {
+        check_conformity(old, &done);
+    } else {
+        let (mut mesh, mut positions) = (old.clone(), positions.to_vec());
+        for part in parts {
+            if let Some(done) = checked_cut(&mesh, &positions, &part, options) {
+                (mesh, positions) = ((*done.change.mesh).clone(), done.positions);
+            }
+        }
+    }
+    Some(done)
+}
 
+fn check_report(old: &Mesh, cut: &Cut) {
+    let new = &cut.change.mesh;
     let report = &cut.report;
     assert_eq!(report.new_nodes, new.nodes().len() - old.nodes().len());
     assert_eq!(report.new_tetrahedra, new.tetrahedra().len() - old.tetrahedra().len());

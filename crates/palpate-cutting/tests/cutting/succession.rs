@@ -1,0 +1,108 @@
+//! Many random cuts of one body, one after the other.
+
+use palpate_cutting::{Blade, CutOptions, cut};
+use palpate_geometry::{Point, vec3};
+use palpate_model::Mesh;
+
+use crate::support::{Random, box_mesh, checked_cut};
+
+/// A plane, a square, a stroke or a loop somewhere in the box of `size`.
+fn random_blade(random: &mut Random, size: f64) -> Option<Blade> {
+    let mut point = |low: f64, high: f64| -> Point { [0; 3].map(|_| random.between(low, high)) };
+    let at = point(0.0, size);
+    let normal = point(-1.0, 1.0);
+    let kind = point(0.0, 4.0)[0];
+    // Often on the grid: nodes, edges and faces in the blade.
+    let at = if kind.fract() < 0.3 { at.map(f64::round) } else { at };
+    let normal = if kind.fract() < 0.2 { normal.map(f64::round) } else { normal };
+    if kind < 1.0 {
+        Blade::plane(at, normal, None).ok()
+    } else if kind < 2.0 {
+        Blade::plane(at, normal, Some(0.7 * size)).ok()
+    } else if kind < 3.0 {
+        let [along, depth] = [point(-0.2, 0.2), point(-0.8, 0.8)];
+        let edge = |k: i32| {
+            let heel = vec3::add_scaled(at, along, size * f64::from(k) / 3.0);
+            [heel, vec3::add_scaled(heel, depth, size)]
+        };
+        Blade::stroke(&(0..6).map(edge).collect::<Vec<_>>()).ok()
+    } else {
+        let points: Vec<Point> = (0..5).map(|_| point(-0.2 * size, 1.2 * size)).collect();
+        Blade::closed_loop(&points).ok()
+    }
+}
+
+/// Cuts a box again and again, from the start when it has grown much; returns how many cuts opened something.
+fn cut_often(cuts: usize, cells: usize, seed: u64, options: &CutOptions) -> usize {
+    let mut random = Random(seed);
+    let whole = box_mesh([cells; 3], 0.1, seed);
+    let limit = 12 * whole.tetrahedra().len();
+    let mut mesh: Mesh = whole.clone();
+    let mut positions = mesh.nodes().to_vec();
+    let mut opened = 0;
+    for _ in 0..cuts {
+        let Some(blade) = random_blade(&mut random, cells as f64) else {
+            continue;
+        };
+        let Some(done) = checked_cut(&mesh, &positions, &blade, options) else {
+            continue;
+        };
+        opened += 1;
+        // The body gapes a little, so that blades and lips are not where they were.
+        let shift = |point: Point| {
+            let bend = 0.01 * (point[0] + 2.0 * point[1]).sin();
+            [point[0] + bend, point[1], point[2] - 0.5 * bend]
+        };
+        (mesh, positions) = ((*done.change.mesh).clone(), done.positions);
+        positions.iter_mut().for_each(|point| *point = shift(*point));
+        if mesh.tetrahedra().len() > limit {
+            (mesh, positions) = (whole.clone(), whole.nodes().to_vec());
+        }
+    }
+    opened
+}
+
+#[test]
+fn random_cuts_leave_meshes() {
+    let opened = cut_often(300, 3, 1, &CutOptions::default());
+    assert!(opened > 100, "{opened}");
+}
+
+#[test]
+fn the_shortest_edge_bounds_what_many_cuts_can_make() {
+    let options = CutOptions { min_edge: 0.3, ..CutOptions::default() };
+    let mut random = Random(5);
+    let mut mesh = box_mesh([3; 3], 0.1, 5);
+    let shortest = |mesh: &Mesh| {
+        let edges = mesh
+            .tetrahedra()
+            .iter()
+            .flat_map(|&[a, b, c, d]| [[a, b], [a, c], [a, d], [b, c], [b, d], [c, d]]);
+        let length = |[a, b]: [u32; 2]| {
+            vec3::distance_squared(mesh.nodes()[a as usize], mesh.nodes()[b as usize])
+        };
+        edges.map(length).fold(f64::INFINITY, f64::min).sqrt()
+    };
+    for _ in 0..400 {
+        let at = [0; 3].map(|_| random.between(0.0, 3.0));
+        let normal = [0; 3].map(|_| random.between(-1.0, 1.0));
+        let blade = Blade::plane(at, normal, None).unwrap();
+        if let Some(done) = cut(&mesh, mesh.nodes(), &blade, &options).unwrap() {
+            mesh = (*done.change.mesh).clone();
+        }
+    }
+    assert!(shortest(&mesh) >= 0.999 * 0.3, "{}", shortest(&mesh));
+    assert!(mesh.tetrahedra().len() < 30_000, "{}", mesh.tetrahedra().len());
+}
+
+/// `PALPATE_CUTS=10000` for the long run.
+#[test]
+fn as_many_random_cuts_as_asked_for() {
+    let asked = std::env::var("PALPATE_CUTS").ok().and_then(|count| count.parse().ok());
+    let cuts: usize = asked.unwrap_or(200);
+    for seed in 0..10 {
+        let snap = 0.04 * seed as f64;
+        let options = CutOptions { snap, min_quality: 0.03 * seed as f64, min_edge: 0.02 };
+        cut_often(cuts / 10, 2, seed, &options);
+    }
+}
