@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +17,9 @@ from palpate.hands import Pull, Tool
 from palpate.mesh import Mesh
 from palpate.model import Body, Model, body_index, read_model
 from palpate.scene import METHODS, SPLITS, _choice
+
+if TYPE_CHECKING:
+    from palpate.viewer import Viewer
 
 
 @dataclass(frozen=True)
@@ -107,16 +111,13 @@ class Simulation:
         time_step = _arrays.scalar(time_step, "time_step")
         if time_step <= 0:
             raise ValueError(f"time_step: expected a positive number of seconds, got {time_step}")
-        self._start(
-            _core.Simulation(
-                model._core,
-                time_step,
-                _arrays.count(threads, "threads"),
-                None if leaf_size is None else _arrays.count(leaf_size, "leaf_size"),
-                _choice(split, "split", SPLITS),
-                _choice(method, "method", METHODS),
-            )
-        )
+        self._options: dict[str, Any] = {
+            "threads": _arrays.count(threads, "threads"),
+            "leaf_size": None if leaf_size is None else _arrays.count(leaf_size, "leaf_size"),
+            "split": _choice(split, "split", SPLITS),
+            "method": _choice(method, "method", METHODS),
+        }
+        self._start(_core.Simulation(model._core, time_step, **self._options))
 
     def _start(self, core: _core.Simulation) -> None:
         self._core = core
@@ -263,8 +264,43 @@ class Simulation:
             If the file is damaged or not a checkpoint.
         """
         simulation = cls.__new__(cls)
+        simulation._options = {"threads": threads}
         simulation._start(_core.Simulation.load(os.fspath(path), _arrays.count(threads, "threads")))
         return simulation
+
+    def view(
+        self,
+        *,
+        host: str = "127.0.0.1",
+        port: int = 8642,
+        browser: bool = True,
+        play: bool = True,
+        block: bool = True,
+        title: str = "",
+    ) -> Viewer:
+        """Show the simulation in the browser, to look at and to touch.
+
+        The viewer steps the simulation until it is closed; meanwhile leave that to it.
+
+        Parameters
+        ----------
+        host, port
+            Where the page is served; another port when this one is taken.
+        browser : bool
+            Open the user's browser.
+        play : bool
+            Play at once.
+        block : bool
+            Return when Ctrl-C was pressed; else at once, with a viewer that has ``url``,
+            ``wait()`` and ``close()`` and is a context manager.
+        title : str
+            Name at the top of the page.
+        """
+        from palpate.viewer import view
+
+        return view(
+            self, host=host, port=port, browser=browser, play=play, block=block, title=title
+        )
 
     def _index(self, body: int | str) -> int:
         return body_index(self._names, body)

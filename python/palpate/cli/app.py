@@ -18,6 +18,7 @@ from palpate.cli.output import reporting
 from palpate.cli.simulate import simulate
 from palpate.cli.tree import tree
 from palpate.cli.tune import tune
+from palpate.cli.view import view
 
 app = typer.Typer(
     name="palpate",
@@ -53,6 +54,7 @@ for _name, _command in (
     ("tree", tree),
     ("detect", detect),
     ("simulate", simulate),
+    ("view", view),
     ("tune", tune),
     ("mesh", mesh),
     ("convert", convert),

@@ -1,0 +1,305 @@
+"""A running simulation as a `Player`: steps it, carries out what the pages ask, shows its state."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from palpate import pictures
+from palpate._arrays import Float64Array
+from palpate.contacts import DetectionStats
+from palpate.model import Body, Model
+from palpate.results.frames import contact_depths
+from palpate.simulation import Simulation, StepReport
+from palpate.viewer.editing import edited, settings_of, transferred
+from palpate.viewer.hands import Hands
+from palpate.viewer.player import Outcome, Player, Wishes
+from palpate.viewer.protocol import Command, encode, finite
+from palpate.viewer.surface import Surfaces, deformation
+
+#: Seconds between two counts of the tested triangle pairs while nobody looks at them closely.
+_COUNT_INTERVAL = 0.5
+#: States before a cut that are kept at most.
+_UNDO = 16
+
+
+class LivePlayer(Player):
+    """Plays a simulation; the settings that it cannot change are changed by making it anew."""
+
+    mode = "live"
+
+    def __init__(self, simulation: Simulation) -> None:
+        self._simulation = simulation
+        #: What `reset` returns to, with the settings of now.
+        self._start = simulation.model
+        self._remade = False
+        self._passed = 0.0
+        self._surfaces = Surfaces([body.mesh for body in simulation.model.bodies])
+        self._version = 0
+        self._sent = -1
+        self._rest = simulation.positions
+        self._report: StepReport | None = None
+        self._stats: DetectionStats | None = None
+        self._counted = 0.0
+        self._undo: list[Any] = []
+        self._hands = Hands(simulation)
+
+    @property
+    def simulation(self) -> Simulation:
+        """The simulation that is played now."""
+        return self._simulation
+
+    @property
+    def interval(self) -> float:
+        return self._simulation.time_step
+
+    @property
+    def time(self) -> float:
+        return self._passed + self._simulation.time
+
+    @property
+    def at_end(self) -> bool:
+        return False
+
+    def hello(self) -> dict[str, Any]:
+        features = ["settings", "reset", "pull", "tool"]
+        if hasattr(self._simulation, "cut"):
+            features.append("cut")
+        fields = ["displacement", "deformation", "depth", "force"]
+        if hasattr(self._simulation, "von_mises"):
+            fields.append("stress")
+        return {"features": features, "fields": fields}
+
+    def scene(self) -> bytes:
+        model = self._simulation.model
+        self._sent = self._version
+        arrays: dict[str, npt.NDArray[Any]] = {}
+        for index, body in enumerate(model.bodies):
+            seen = body.mesh.nodes[self._surfaces.nodes[index]]
+            arrays[f"rest/{index}"] = seen.astype(np.float32)
+            arrays[f"triangles/{index}"] = self._surfaces.triangles[index]
+        return encode(
+            "scene",
+            {
+                "version": self._version,
+                "bodies": looks(model.bodies),
+                "up": upward(model.gravity),
+                "bounds": bounds(model.bodies, self._simulation.positions),
+            },
+            arrays,
+        )
+
+    def state(self) -> dict[str, Any]:
+        model = self._simulation.model
+        return {
+            "time_step": self._simulation.time_step,
+            "gravity": model.gravity,
+            "bodies": [settings_of(body) for body in model.bodies],
+            "undo": len(self._undo),
+        }
+
+    def advance(self) -> None:
+        self._hands.move(self._simulation.time_step)
+        self._report = self._simulation.step()
+
+    def changed(self) -> bool:
+        if not self._surfaces.fits(self._simulation.positions):
+            self._new_topology()
+        return self._version != self._sent
+
+    def frame(self, number: int, wishes: Wishes, numbers: dict[str, Any]) -> bytes:
+        simulation = self._simulation
+        positions = simulation.positions
+        arrays: dict[str, npt.NDArray[Any]] = {"positions": self._surfaces.stack(positions)}
+        if wishes.field is not None:
+            values = self._field(wishes.field, positions)
+            if values is not None:
+                arrays["field"] = self._surfaces.stack_values(values)
+        if wishes.contacts:
+            contacts = simulation.contacts
+            arrays["contact_points"] = contacts.points.astype(np.float32)
+            arrays["contact_normals"] = contacts.normals.astype(np.float32)
+            arrays["contact_forces"] = np.linalg.norm(contacts.forces, axis=1).astype(np.float32)
+        now = time.perf_counter()
+        if wishes.touching or now - self._counted > _COUNT_INTERVAL:
+            found = simulation.intersections()
+            self._stats = found.stats
+            self._counted = now
+            if wishes.touching:
+                arrays["touching"] = self._surfaces.triangle_numbers(found.pairs)
+        header = {
+            "version": self._version,
+            "number": number,
+            "time": self.time,
+            "field": wishes.field if "field" in arrays else None,
+            "numbers": {**numbers, **self._numbers()},
+            **self._hands.shown(),
+        }
+        return encode("frame", finite(header), arrays)
+
+    def obey(self, command: Command, client: int) -> Outcome:
+        kind = command["type"]
+        if kind in ("grab", "drag", "release", "tool", "tool_away"):
+            return self._handle(command, client)
+        if kind == "cut":
+            return self._cut(command["edges"])
+        if kind == "undo":
+            return self._undo_cut()
+        if kind == "reset":
+            return self._reset()
+        if kind == "settings":
+            return self._change(command)
+        return Outcome()
+
+    def leave(self, client: int) -> None:
+        self._hands.leave(client)
+
+    def _handle(self, command: Command, client: int) -> Outcome:
+        if command["type"] == "tool" and not self._hands.has_tool:
+            self._hands.take_probe(command)
+            self._remake(self._simulation.model, self._simulation.time_step)
+            self._hands.obey(command, client, self._surfaces)
+            return Outcome(scene=True, frame=True, state=True)
+        self._hands.obey(command, client, self._surfaces)
+        return Outcome(frame=True)
+
+    def _cut(self, edges: list[Any]) -> Outcome:
+        import palpate
+
+        before = self._simulation.snapshot()
+        blade = palpate.Blade.stroke(np.asarray(edges, dtype=np.float64))  # type: ignore[attr-defined]
+        report = self._simulation.cut(blade)  # type: ignore[attr-defined]
+        self._undo = [*self._undo[1 - _UNDO :], before]
+        self._new_topology()
+        return Outcome(scene=True, frame=True, state=True, notice=str(report))
+
+    def _undo_cut(self) -> Outcome:
+        if not self._undo:
+            return Outcome(notice="there is no cut to undo")
+        self._hands.let_go()
+        self._simulation.restore(self._undo.pop())
+        self._new_topology()
+        return Outcome(scene=True, frame=True, state=True)
+
+    def _reset(self) -> Outcome:
+        self._hands.let_go()
+        self._passed = 0.0
+        self._undo.clear()
+        self._report = None
+        if self._remade:
+            start = self._hands.with_probe(self._start)
+            self._replace(self._simulation_of(start, self._simulation.time_step))
+        else:
+            self._simulation.reset()
+        self._new_topology()
+        return Outcome(scene=True, frame=True, state=True)
+
+    def _change(self, command: Command) -> Outcome:
+        """Settings are part of the model: a new simulation takes over the state."""
+        time_step = command["time_step"] or self._simulation.time_step
+        model = edited(self._simulation.model, command)
+        self._remake(model, time_step)
+        self._start = edited(self._start, command)
+        dropped = bool(self._undo)
+        self._undo.clear()
+        notice = "cuts made before a change of settings cannot be undone" if dropped else None
+        return Outcome(scene=True, frame=True, state=True, notice=notice)
+
+    def _remake(self, model: Model, time_step: float) -> None:
+        before = self._simulation
+        self._hands.let_go()
+        model = self._hands.with_probe(model)
+        after = transferred(before, model, lambda moved: self._simulation_of(moved, time_step))
+        self._passed += before.time
+        self._remade = True
+        self._replace(after)
+
+    def _simulation_of(self, model: Model, time_step: float) -> Simulation:
+        return Simulation(model, time_step=time_step, **self._simulation._options)
+
+    def _replace(self, simulation: Simulation) -> None:
+        self._simulation = simulation
+        self._hands.attach(simulation)
+        self._new_topology()
+
+    def _new_topology(self) -> None:
+        bodies = self._simulation.model.bodies
+        self._surfaces = Surfaces([body.mesh for body in bodies])
+        self._rest = tuple(body.mesh.nodes for body in bodies)
+        self._version += 1
+
+    def _field(self, name: str, positions: tuple[Float64Array, ...]) -> list[Float64Array] | None:
+        """A number per node of each body."""
+        pairs = list(zip(self._rest, positions, strict=True))
+        if name == "displacement":
+            return [np.linalg.norm(now - rest, axis=1) for rest, now in pairs]
+        if name == "deformation":
+            return [deformation(rest, now) for rest, now in pairs]
+        if name == "force":
+            return [np.linalg.norm(each, axis=1) for each in self._simulation.contact_forces]
+        if name == "depth":
+            offsets = np.concatenate([[0], np.cumsum([len(each) for each in positions])])
+            depths = contact_depths(self._simulation, offsets)
+            return [depths[start:end] for start, end in pairwise(offsets)]
+        stress: Callable[[], Any] | None = getattr(self._simulation, "von_mises", None)
+        return None if stress is None else list(stress())
+
+    def _numbers(self) -> dict[str, Any]:
+        numbers: dict[str, Any] = {}
+        if self._report is not None:
+            report = self._report
+            numbers = {
+                "times": report.times,
+                "contacts": report.contacts,
+                "self_contacts": report.self_contacts,
+                "penetrating_nodes": report.penetrating_nodes,
+                "max_depth": report.max_depth,
+                "newton_iterations": report.newton_iterations,
+            }
+        if self._stats is not None:
+            numbers["pair_tests"] = self._stats.pair_tests
+            numbers["all_pairs"] = self._stats.all_pairs
+        return numbers
+
+
+def looks(bodies: tuple[Body, ...]) -> list[dict[str, Any]]:
+    """How the bodies are drawn, colours as in our pictures."""
+    rows = []
+    for index, body in enumerate(bodies):
+        rigid = body.rigid is not None
+        chosen = pictures.RIGID if rigid else pictures.PALETTE[index % len(pictures.PALETTE)]
+        rows.append(
+            {
+                "name": body.name,
+                "color": list(body.color or chosen),
+                "opacity": body.opacity,
+                "rigid": rigid,
+                "nodes": len(body.mesh.nodes),
+                "tetrahedra": len(body.mesh.tetrahedra),
+            }
+        )
+    return rows
+
+
+def upward(gravity: tuple[float, float, float]) -> list[float]:
+    """Unit vector against gravity, z where there is none."""
+    vector = -np.asarray(gravity)
+    length = float(np.linalg.norm(vector))
+    return [0.0, 0.0, 1.0] if length == 0 else (vector / length + 0.0).tolist()
+
+
+def bounds(
+    bodies: tuple[Body, ...], positions: tuple[Float64Array, ...]
+) -> dict[str, list[list[float]]]:
+    """Corners of the box around the deformable bodies (all, if there is none), and around all."""
+    soft = [points for body, points in zip(bodies, positions, strict=True) if body.rigid is None]
+    result = {}
+    for name, parts in (("soft", soft or list(positions)), ("all", list(positions))):
+        cloud = np.concatenate(parts)
+        result[name] = [cloud.min(axis=0).tolist(), cloud.max(axis=0).tolist()]
+    return result

@@ -1,0 +1,277 @@
+// Puts the page together: messages come in, the stage and the panel follow, commands go out.
+
+import { Connection } from "palpate/connection";
+import { Transport } from "palpate/controls";
+import { Overlay } from "palpate/overlay";
+import { Panel, showLegend } from "palpate/panel";
+import { Pointer } from "palpate/pointer";
+import { PROTOCOL, positionsOf } from "palpate/protocol";
+import { Recording } from "palpate/recording";
+import { Stage } from "palpate/stage";
+
+const find = (name) => document.getElementById(name);
+
+class App {
+  constructor() {
+    this.view = {
+      field: null, contacts: false, touching: false, wireframe: false, boxes: false, grid: true, opacity: 1, strength: 1, probe: 1, cutDepth: null,
+    };
+    this.mode = "look";
+    this.features = [];
+    this.high = 0;
+    this.received = 0;
+    this.stage = new Stage(find("stage"));
+    this.overlay = new Overlay(this.stage, find("labels"));
+    this.transport = new Transport(find("transport"), this);
+    this.panel = new Panel(find("panel"), this);
+    this.pointer = new Pointer(this.stage, this);
+    for (const button of find("modes").children) button.onclick = () => this.setMode(button.dataset.mode);
+    find("panel_toggle").onclick = () => this.togglePanel();
+    find("problem").querySelector("button").onclick = () => this.send({ type: "reload" });
+    addEventListener("keydown", (event) => this.key(event));
+    if (innerWidth < 900) document.body.classList.add("bare");
+    this.setMode("look");
+    const recording = find("recording");
+    const Source = recording ? Recording : Connection;
+    this.source = new Source((message) => this.receive(message), (open) => this.connected(open), recording);
+  }
+
+  send(command) {
+    this.source.send(command);
+  }
+
+  can(feature) {
+    return this.features.includes(feature);
+  }
+
+  receive(message) {
+    const { header } = message;
+    if (header.type === "frame") return this.frame(message);
+    if (header.type === "hello") this.hello(header);
+    else if (header.type === "scene") this.scene(message);
+    else if (header.type === "state") this.setState(header);
+    else if (header.type === "notice") this.toast(header.text);
+    else if (header.type === "problem") this.problem(header);
+  }
+
+  hello(header) {
+    if (header.protocol !== PROTOCOL) return location.reload();
+    this.features = header.features;
+    this.modeOfSource = header.mode;
+    this.loading(header.mode === "loading" ? "Loading the model" : null);
+    find("title").textContent = header.title;
+    document.title = header.title ? `${header.title} – palpate` : "palpate";
+    this.haveScene = false;
+    if (header.mode === "loading") return;
+    find("problem").hidden = true;
+    this.transport.hello(header);
+    this.panel.hello(header);
+    const needs = { look: null, pull: "pull", push: "tool", cut: "cut" };
+    for (const button of find("modes").children) {
+      const need = needs[button.dataset.mode];
+      button.hidden = need !== null && !this.can(need);
+    }
+    find("modes").hidden = !this.can("pull") && !this.can("cut");
+    if (!this.chosen) this.setMode(this.can("pull") ? "pull" : "look");
+    if (!(header.fields ?? []).includes(this.view.field)) this.view.field = null;
+    this.subscribe();
+  }
+
+  scene(message) {
+    const { header } = message;
+    this.version = header.version;
+    find("problem").hidden = true;
+    const names = header.bodies.map((body) => body.name).join("/");
+    this.stage.setScene(message, this.haveScene && names.startsWith(this.names ?? "/"));
+    this.names = names;
+    this.haveScene = true;
+    this.high = 0;
+    this.panel.scene();
+    this.restyle();
+  }
+
+  frame(message) {
+    const { header, arrays } = message;
+    if (header.version !== this.version) return;
+    this.received += 1;
+    const positions = positionsOf(message);
+    this.positions = positions;
+    this.last = message;
+    this.stage.move(positions);
+    this.overlay.update(message, positions, this.view);
+    this.paint(header, arrays, positions);
+    this.transport.moment(header);
+    this.chips(header);
+    if (header.numbers) {
+      if (header.numbers.times) this.panel.chart.add(header.numbers.times, this.state?.time_step ?? 0);
+      this.figures(header.numbers);
+    }
+    this.loading(null);
+  }
+
+  /** Figures are for eyes: four times a second. */
+  figures(numbers) {
+    this.newest = numbers;
+    this.figuresDue ??= setTimeout(() => {
+      this.figuresDue = undefined;
+      this.panel.numbers(this.newest);
+    }, 250);
+  }
+
+  paint(header, arrays, positions) {
+    let values = arrays.field ?? null;
+    let field = header.field;
+    if (this.modeOfSource === "recording" && this.view.field === "displacement") {
+      values = this.displacements(positions);
+      field = "displacement";
+    }
+    if (!this.view.field || !values || field !== this.view.field) {
+      for (const body of this.stage.bodies) body.paint(null);
+      showLegend(find("legend"), null);
+      return;
+    }
+    let most = 0;
+    for (const body of this.stage.bodies) {
+      if (body.look.rigid) continue;
+      for (let i = body.start; i < body.start + body.nodeCount; i++) most = Math.max(most, values[i]);
+    }
+    // The range grows at once and shrinks slowly, so that colours do not flicker.
+    this.high = Math.max(most, 0.985 * this.high);
+    for (const body of this.stage.bodies) body.paint(body.look.rigid ? null : values, this.high || 1);
+    showLegend(find("legend"), this.view.field, this.high);
+  }
+
+  displacements(positions) {
+    const values = new Float32Array(positions.length / 3);
+    for (const body of this.stage.bodies) {
+      for (let i = 0; i < body.nodeCount; i++) {
+        const [from, to] = [3 * i, 3 * (body.start + i)];
+        values[body.start + i] = Math.hypot(...[0, 1, 2].map((k) => positions[to + k] - body.rest[from + k]));
+      }
+    }
+    return values;
+  }
+
+  setState(state) {
+    this.state = state;
+    this.transport.state(state);
+    this.panel.state(state);
+    document.body.dataset.playing = state.playing;
+    if (!state.playing) this.chips(this.last?.header);
+  }
+
+  chips(header) {
+    const chips = [];
+    const { state } = this;
+    const rate = header?.numbers?.real_time;
+    if (this.broken) chips.push(["bad", "no connection, trying again"]);
+    else if (this.modeOfSource === "live" && state?.playing && rate) {
+      const wanted = state.speed;
+      const behind = wanted !== null && rate < 0.92 * wanted;
+      const text = `${rate.toFixed(2)}× real time`;
+      chips.push(behind ? ["warn", `${text}, behind`, "The simulation cannot keep up with the chosen speed"] : ["", text]);
+    } else if (this.modeOfSource === "recording") chips.push(["", "recording"]);
+    const key = JSON.stringify(chips.map((chip) => chip.slice(0, 2)));
+    if (key === this.chipKey) return;
+    this.chipKey = key;
+    find("chips").replaceChildren(
+      ...chips.map(([kind, text, title]) => Object.assign(document.createElement("span"), { className: `chip ${kind}`, textContent: text, title: title ?? "" })),
+    );
+  }
+
+  connected(open) {
+    this.broken = !open;
+    this.chips(this.last?.header);
+    if (open) this.loading(null);
+  }
+
+  loading(text) {
+    find("veil").classList.toggle("gone", !text);
+    if (text) find("veil").lastElementChild.textContent = text;
+  }
+
+  problem({ title, text }) {
+    this.loading(null);
+    find("problem").hidden = false;
+    find("problem").querySelector("h2").textContent = title;
+    find("problem").querySelector("pre").textContent = text;
+  }
+
+  toast(text) {
+    const toast = Object.assign(document.createElement("div"), { className: "toast", textContent: text });
+    find("toasts").append(toast);
+    while (find("toasts").children.length > 3) find("toasts").firstChild.remove();
+    setTimeout(() => toast.remove(), 4500);
+  }
+
+  /** Change what is shown: any of the entries of `view`. */
+  set(change) {
+    Object.assign(this.view, change);
+    if ("field" in change) this.high = 0;
+    this.panel.reflect(this.view);
+    this.restyle(change);
+    this.subscribe();
+    if (this.last) {
+      this.overlay.update(this.last, this.positions, this.view);
+      this.paint(this.last.header, this.last.arrays, this.positions);
+    }
+    this.stage.touch();
+  }
+
+  restyle(change = this.view) {
+    for (const body of this.stage.bodies) {
+      if (change.wireframe !== undefined) body.restyle({ wireframe: change.wireframe });
+      if (change.opacity !== undefined && !body.look.rigid && (change.opacity < 1 || change !== this.view)) body.restyle({ opacity: change.opacity });
+    }
+    this.stage.ground.grid.visible = this.stage.ground.shadow.visible = this.view.grid;
+  }
+
+  subscribe() {
+    const { field, contacts, touching } = this.view;
+    this.send({ type: "show", field, contacts, touching });
+  }
+
+  setMode(mode) {
+    this.mode = mode;
+    find("stage").dataset.mode = mode;
+    for (const button of find("modes").children) button.setAttribute("aria-pressed", button.dataset.mode === mode);
+  }
+
+  togglePlay() {
+    this.send({ type: "play", on: !this.state?.playing });
+  }
+
+  step() {
+    this.send({ type: "step", count: 1 });
+  }
+
+  reset() {
+    this.send({ type: "reset" });
+  }
+
+  togglePanel() {
+    document.body.classList.toggle("bare");
+  }
+
+  key(event) {
+    if (event.ctrlKey || event.metaKey || event.altKey) return;
+    if (event.target.closest?.("input:not([type=checkbox]):not([type=range]), select")) return;
+    const toggles = { c: "contacts", t: "touching", w: "wireframe", b: "boxes", g: "grid" };
+    const key = event.key.toLowerCase();
+    const modes = { 1: "look", 2: "pull", 3: "push", 4: "cut" };
+    const actions = {
+      " ": () => this.togglePlay(), arrowright: () => this.step(), r: () => this.reset(), f: () => this.stage.frameCamera(),
+      z: () => this.can("cut") && this.send({ type: "undo" }), p: () => this.togglePanel(), escape: () => this.pointer.cancel(),
+    };
+    if (toggles[key]) this.set({ [toggles[key]]: !this.view[toggles[key]] });
+    else if (modes[key]) {
+      this.chosen = true;
+      const button = [...find("modes").children].find((each) => each.dataset.mode === modes[key]);
+      if (!button.hidden) this.setMode(modes[key]);
+    } else if (actions[key]) actions[key]();
+    else return;
+    event.preventDefault();
+  }
+}
+
+globalThis.palpate = new App();

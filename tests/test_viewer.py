@@ -1,0 +1,519 @@
+"""The viewer: its protocol, its session without a browser, its server against strangers."""
+
+import json
+import socket
+import time
+import urllib.error
+import urllib.request
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.sync.client import connect
+
+import palpate
+from palpate.viewer import NullViewer, Viewer, ViewerError
+from palpate.viewer.live import LivePlayer
+from palpate.viewer.page import page_files
+from palpate.viewer.probe import aim, probe_mesh
+from palpate.viewer.protocol import PROTOCOL, ProtocolError, decode, encode, parse_command
+from palpate.viewer.surface import Surfaces, deformation
+
+_JSON = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=8),
+    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=8), inner),
+    max_leaves=10,
+)
+
+
+# --- protocol
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    st.lists(
+        st.tuples(st.sampled_from(["float32", "uint32", "uint16", "uint8"]), st.integers(0, 7)),
+        max_size=4,
+    ),
+    st.text(max_size=20),
+)
+def test_messages_come_back(kinds, title):
+    arrays = {
+        f"a/{i}": np.arange(3 * count, dtype=dtype).reshape(count, 3)
+        for i, (dtype, count) in enumerate(kinds)
+    }
+    message = encode("hello", {"title": title}, arrays)
+    header, found = decode(message)
+    assert (header["type"], header["title"]) == ("hello", title)
+    assert len(message) % 4 == 0
+    assert list(found) == list(arrays)
+    for name, values in arrays.items():
+        assert found[name].dtype == values.dtype
+        assert np.array_equal(found[name], values)
+
+
+def test_a_message_is_what_its_description_says():
+    message = encode("frame", {"n": 1}, {"p": np.array([[1.5, 2, 3]], dtype=np.float32)})
+    size = int.from_bytes(message[:4], "little")
+    assert json.loads(message[4 : 4 + size]) == {
+        "type": "frame",
+        "n": 1,
+        "arrays": [["p", "float32", [1, 3]]],
+    }
+    assert message[4 + size :] == np.array([1.5, 2, 3], dtype="<f4").tobytes()
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.binary(max_size=60) | st.text(max_size=60) | _JSON.map(json.dumps))
+def test_garbage_is_refused(text):
+    with pytest.raises(ProtocolError):
+        parse_command(text)
+
+
+@settings(max_examples=200, deadline=None)
+@given(
+    st.sampled_from(["grab", "drag", "play", "speed", "settings", "cut", "tool", "show", "seek"]),
+    st.dictionaries(
+        st.sampled_from(["grip", "body", "node", "target", "on", "value", "edges", "material"]),
+        _JSON,
+    ),
+)
+def test_half_right_commands_are_complete_or_refused(kind, entries):
+    try:
+        command = parse_command(json.dumps({**entries, "type": kind}))
+    except ProtocolError:
+        return
+    assert command["type"] == kind
+    assert np.isfinite(command.get("target", (0.0,))).all()
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        {"type": "play", "on": 1},
+        {"type": "speed", "value": float("nan")},
+        {"type": "speed", "value": 0},
+        {"type": "step", "count": 10**9},
+        {"type": "drag", "grip": 1, "target": [0, 0, float("inf")]},
+        {"type": "drag", "grip": 1, "target": [0, 0]},
+        {"type": "settings", "material": {"law": "evil"}},
+        {"type": "settings", "body": 0, "material": {"poisson": 0.5}},
+        {"type": "cut", "edges": [[[0, 0, 0], [0, 0, 1]]]},
+        {"type": "__class__"},
+    ],
+)
+def test_wrong_values_are_refused(command):
+    with pytest.raises(ProtocolError):
+        parse_command(json.dumps(command))
+
+
+# --- what is seen
+
+
+def test_surfaces_are_the_surface(make_box):
+    meshes = [make_box((3, 3, 3)), make_box((1, 2, 1), origin=(2, 0, 0))]
+    surfaces = Surfaces(meshes)
+    positions = [mesh.nodes + index for index, mesh in enumerate(meshes)]
+    stacked = surfaces.stack(positions)
+    assert len(stacked) == sum(len(mesh.surface_nodes) for mesh in meshes)
+    for index, mesh in enumerate(meshes):
+        part = stacked[surfaces.offsets[index] : surfaces.offsets[index + 1]]
+        seen = part[surfaces.triangles[index]]
+        assert np.allclose(seen, positions[index][mesh.triangles], atol=1e-6)
+    assert surfaces.fits(positions)
+    assert not surfaces.fits(positions[::-1])
+    pairs = np.array([[0, 5, 1, 2], [0, 5, 1, 0]])
+    first = len(meshes[0].triangles)
+    assert surfaces.triangle_numbers(pairs).tolist() == [5, first, first + 2]
+
+
+def test_deformation_does_not_see_rigid_motion(make_box):
+    nodes = make_box((2, 2, 3)).nodes
+    turn = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
+    turn *= np.sign(np.linalg.det(turn))
+    moved = nodes @ turn.T + (1, 2, 3)
+    assert np.allclose(deformation(nodes, moved), 0, atol=1e-12)
+    assert deformation(nodes, moved * (1, 1, 1.5)).max() > 0.05
+    assert deformation(nodes, nodes * (1, 1, -1)).max() > 0.1  # a mirror is no motion
+
+
+def test_the_probe_is_closed_and_points_where_it_aims():
+    mesh = probe_mesh(0.01, 0.1)
+    sides = np.sort(
+        np.concatenate(
+            [mesh.triangles[:, [0, 1]], mesh.triangles[:, [1, 2]], mesh.triangles[:, [2, 0]]]
+        ),
+        axis=1,
+    )
+    assert (np.unique(sides, axis=0, return_counts=True)[1] == 2).all()
+    a, b, c = (mesh.nodes[mesh.triangles[:, k]] for k in range(3))
+    volume = np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6
+    assert volume == pytest.approx(np.pi * 0.01**2 * (0.1 - 0.01 / 3), rel=0.03)
+    for direction in [(0, 0, -1), (1, 0, 0), (0.3, -2, 0.5), (0, 0, 0)]:
+        rotation = aim(direction)
+        assert np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-12)
+        assert np.linalg.det(rotation) == pytest.approx(1)
+        if any(direction):
+            unit = np.array(direction) / np.linalg.norm(direction)
+            assert np.allclose(rotation @ (0, 0, -1), unit)
+
+
+# --- a session without a browser
+
+
+@pytest.fixture
+def viewer():
+    return NullViewer(palpate.Simulation("small"))
+
+
+def test_a_page_gets_all_it_needs(viewer):
+    assert viewer.sent == ["hello", "scene", "state", "frame"]
+    hello, scene = viewer.header("hello"), viewer.header("scene")
+    assert (hello["protocol"], hello["mode"]) == (PROTOCOL, "live")
+    assert [body["name"] for body in scene["bodies"]] == ["lower", "middle", "upper", "tray"]
+    assert scene["up"] == [0, 0, 1]
+    rest = [viewer.arrays("scene")[f"rest/{i}"] for i in range(4)]
+    assert np.array_equal(viewer.arrays("frame")["positions"], np.concatenate(rest))
+
+
+def test_it_plays_what_the_simulation_does(viewer):
+    by_hand = palpate.Simulation("small")
+    by_hand.step(9)
+    viewer.send({"type": "step", "count": 9})
+    meshes = [body.mesh for body in by_hand.model.bodies]
+    expected = Surfaces(meshes).stack(by_hand.positions)
+    assert np.array_equal(viewer.arrays("frame")["positions"], expected)
+    numbers = viewer.header("frame")["numbers"]
+    assert numbers["all_pairs"] > 1e6
+    assert sum(numbers["times"].values()) > 0
+
+
+@pytest.mark.parametrize("speed", [0.5, 1, 2])
+def test_it_keeps_the_time_that_was_asked_for(viewer, speed):
+    viewer.send({"type": "speed", "value": speed})
+    viewer.send({"type": "play", "on": True})
+    viewer.run(0.5)
+    assert viewer.header("frame")["time"] == pytest.approx(0.5 * speed, abs=0.05)
+    viewer.send({"type": "play", "on": False})
+    before = viewer.header("frame")["time"]
+    viewer.run(0.2)
+    assert viewer.header("frame")["time"] == before
+    assert viewer.header("state")["playing"] is False
+
+
+def test_reset_returns_to_the_start(viewer):
+    start = viewer.arrays("frame")["positions"].copy()
+    viewer.send({"type": "step", "count": 5})
+    assert not np.array_equal(viewer.arrays("frame")["positions"], start)
+    viewer.send({"type": "reset"})
+    assert viewer.header("frame")["time"] == 0
+    assert np.array_equal(viewer.arrays("frame")["positions"], start)
+
+
+def test_settings_change_the_model_and_keep_the_state(viewer):
+    viewer.send({"type": "step", "count": 6})
+    before = viewer.arrays("frame")["positions"].copy()
+    viewer.send(
+        {"type": "settings", "body": 1, "material": {"young": 9e4}, "contact": {"friction": 0.7}}
+    )
+    assert np.array_equal(viewer.arrays("frame")["positions"], before)
+    bodies = viewer.header("state")["bodies"]
+    assert bodies[1]["material"]["young"] == 9e4
+    assert bodies[1]["contact"]["friction"] == 0.7
+    assert bodies[0]["material"]["young"] == 6000
+    viewer.send({"type": "settings", "time_step": 0.005, "gravity": [0, 0, 0]})
+    assert viewer.header("state")["time_step"] == 0.005
+    assert viewer.header("frame")["time"] == pytest.approx(0.1)
+    viewer.send({"type": "step", "count": 2})
+    assert viewer.header("frame")["time"] == pytest.approx(0.11)
+    viewer.send({"type": "reset"})
+    assert viewer.header("state")["gravity"] == [0, 0, 0]
+    assert viewer.header("frame")["time"] == 0
+
+
+def test_a_fall_goes_on_when_settings_change(make_box):
+    viewer = NullViewer(palpate.Simulation([make_box((1, 1, 2))]))
+    viewer.send({"type": "step", "count": 6})
+    before = viewer.arrays("frame")["positions"].copy()
+    viewer.send({"type": "settings", "gravity": [0, 0, 0], "time_step": 0.01})
+    viewer.send({"type": "step", "count": 10})
+    fallen = (before - viewer.arrays("frame")["positions"])[:, 2]
+    assert np.allclose(fallen, 0.1 * 9.81 * 0.1, rtol=1e-3)
+
+
+def test_a_path_goes_on_when_settings_change(make_box):
+    moving = palpate.Body(
+        make_box((1, 1, 1)),
+        name="tool",
+        rigid=[palpate.RigidKey(0.0), palpate.RigidKey(1.0, translation=(0.0, 0.0, 1.0))],
+    )
+    soft = palpate.Body(make_box((1, 1, 1), origin=(3, 0, 0)))
+    viewer = NullViewer(palpate.Simulation(palpate.Model([moving, soft], gravity=(0, 0, 0))))
+    viewer.send({"type": "step", "count": 30})
+    before = viewer.arrays("frame")["positions"].copy()
+    viewer.send({"type": "settings", "body": 1, "material": {"young": 9e4}})
+    assert np.allclose(viewer.arrays("frame")["positions"], before, atol=1e-6)
+    viewer.send({"type": "step", "count": 15})
+    assert viewer.arrays("frame")["positions"][:8, 2].min() == pytest.approx(0.75, abs=1e-5)
+
+
+def test_bad_settings_change_nothing_and_are_told(viewer):
+    viewer.send({"type": "settings", "body": 17, "material": {"young": 9e4}})
+    assert "17" in viewer.header("notice")["text"]
+    viewer.send({"type": "undo"})
+    assert "undo" in viewer.header("notice")["text"]
+    viewer.send({"type": "step", "count": 1})
+    assert viewer.header("frame")["time"] > 0
+
+
+def test_pages_get_what_any_of_them_wants(viewer):
+    viewer.send({"type": "step", "count": 40})
+    assert list(viewer.arrays("frame")) == ["positions"]
+    show = {"type": "show", "field": "deformation", "contacts": True, "touching": True}
+    viewer.send(show, client=1)
+    viewer.send({"type": "show", "field": None, "contacts": False, "touching": False}, client=2)
+    arrays = viewer.arrays("frame")
+    assert {"field", "contact_points", "touching"} <= set(arrays)
+    assert len(arrays["contact_points"]) == len(arrays["contact_forces"]) > 10
+    assert len(arrays["field"]) == len(arrays["positions"])
+    for field in ("displacement", "depth", "force"):
+        viewer.send({**show, "field": field})
+        assert viewer.header("frame")["field"] == field
+        assert viewer.arrays("frame")["field"].min() >= 0
+    assert viewer.arrays("frame")["field"].max() > 0
+    viewer.leave(1)
+    viewer.send({"type": "step", "count": 1}, client=2)
+    assert list(viewer.arrays("frame")) == ["positions"]
+
+
+def highest(viewer, body):
+    """Row of a body's highest surface node, and where it is."""
+    starts = np.cumsum([0, *(len(viewer.arrays("scene")[f"rest/{i}"]) for i in range(body + 1))])
+    part = viewer.arrays("frame")["positions"][starts[body] : starts[body + 1]]
+    return int(part[:, 2].argmax()), part[part[:, 2].argmax()].astype(np.float64)
+
+
+def shifted(at, height):
+    return [at[0], at[1], at[2] + height]
+
+
+def test_tissue_is_pulled_and_let_go(viewer):
+    viewer.send({"type": "step", "count": 20})
+    node, at = highest(viewer, 0)
+    grab = {"type": "grab", "grip": 4, "body": 0, "node": node, "strength": 1.0}
+    viewer.send({**grab, "target": at.tolist()})
+    viewer.send({"type": "drag", "grip": 4, "target": shifted(at, 0.15)})
+    viewer.send({"type": "step", "count": 30})
+    (pull,) = viewer.header("frame")["pulls"]
+    assert pull["force"][2] > 0.05
+    assert pull["from"][2] > at[2] + 0.05
+    # The spring: force along its length, by its stiffness.
+    along = np.array(pull["to"]) - pull["from"]
+    assert np.cross(along, pull["force"]) == pytest.approx(
+        [0, 0, 0], abs=0.2 * np.hypot(*along[:2]) + 2e-3
+    )
+    viewer.send({**grab, "grip": 5, "target": at.tolist()}, client=2)
+    assert len(viewer.header("frame")["pulls"]) == 2
+    viewer.leave(2)
+    viewer.send({"type": "release", "grip": 4})
+    assert viewer.header("frame")["pulls"] == []
+    viewer.send({"type": "drag", "grip": 4, "target": [0, 0, 0]})  # too late: no harm
+    viewer.send({**grab, "body": 3, "target": [0, 0, 0]})
+    assert "rigid" in viewer.header("notice")["text"]
+    viewer.send({**grab, "node": 10**6, "target": [0, 0, 0]})
+    assert "no node" in viewer.header("notice")["text"]
+
+
+def test_the_probe_presses_where_it_is_led(viewer):
+    viewer.send({"type": "step", "count": 20})
+    _, at = highest(viewer, 2)
+    before = viewer.arrays("frame")["positions"].copy()
+    lead = {"type": "tool", "direction": [0, 0, -1], "radius": 0.005}
+    viewer.send({**lead, "tip": shifted(at, 0.004)})
+    assert viewer.header("scene")["bodies"][-1]["name"] == "probe"
+    assert np.array_equal(viewer.arrays("frame")["positions"][: len(before)], before)
+    viewer.send({**lead, "tip": shifted(at, -0.01)})
+    viewer.send({"type": "step", "count": 12})
+    tool = viewer.header("frame")["tool"]
+    assert tool["tip"] == pytest.approx(shifted(at, -0.01))
+    assert tool["force"][2] > 0.05
+    assert highest(viewer, 4)[1][2] > at[2] + 0.05  # the rod stands above its tip
+    # A change of settings leaves it in the hand.
+    viewer.send({"type": "settings", "body": 0, "material": {"young": 7000}})
+    viewer.send({"type": "step", "count": 2})
+    assert viewer.header("frame")["tool"]["force"][2] > 0.05
+    viewer.send({"type": "tool_away"})
+    viewer.send({"type": "step", "count": 30})
+    assert viewer.header("frame")["tool"] is None
+    assert viewer.arrays("frame")["positions"][-50:, 2].min() > at[2] + 0.05
+    viewer.send({"type": "reset"})
+    viewer.send({"type": "step", "count": 2})
+    assert viewer.header("frame")["numbers"]["penetrating_nodes"] == 0
+
+
+def test_a_model_error_is_shown_and_mended(tmp_path):
+    path = tmp_path / "model.bml"
+    path.write_text("BRANCH {\n  TREE { NE nothing.seg }\n}\n")
+    viewer = NullViewer(lambda: LivePlayer(palpate.Simulation(path)))
+    assert viewer.sent == ["problem"]
+    problem = viewer.header("problem")
+    with pytest.raises(palpate.ModelError) as caught:
+        palpate.read_model(path)
+    assert problem["text"] == str(caught.value)
+    viewer.send({"type": "play", "on": True})
+    path.write_text((palpate.model.MODELS / "small.bml").read_text())
+    for mesh in ("small.seg", "tray.seg"):
+        (tmp_path / mesh).write_bytes((palpate.model.MODELS / mesh).read_bytes())
+    viewer.send({"type": "reload"})
+    assert viewer.sent[-4:] == ["hello", "scene", "state", "frame"]
+
+
+def test_a_step_that_fails_pauses_and_says_why(make_box):
+    class Failing(LivePlayer):
+        def advance(self):
+            raise palpate.SimulationError("the test broke it")
+
+    viewer = NullViewer(lambda: Failing(palpate.Simulation([make_box((1, 1, 1))])))
+    viewer.send({"type": "play", "on": True})
+    assert "the test broke it" in viewer.header("problem")["text"]
+    assert viewer.header("state")["playing"] is False
+
+
+# --- the server
+
+
+@pytest.fixture(scope="module")
+def served():
+    simulation = palpate.Simulation("small")
+    with Viewer(lambda: LivePlayer(simulation), port=0, title="small") as viewer:
+        yield viewer
+
+
+def talk(viewer, **options):
+    return connect(viewer.url.replace("http", "ws") + "socket", **options)
+
+
+def read(page, kind, seconds=10):
+    """The next message of a type; frames are confirmed as a page does."""
+    deadline = time.monotonic() + seconds
+    while time.monotonic() < deadline:
+        header, arrays = decode(page.recv(timeout=seconds))
+        if header["type"] == "frame":
+            page.send(json.dumps({"type": "ack", "number": header["number"]}))
+        if header["type"] == kind:
+            return header, arrays
+    raise AssertionError(f"no {kind}")
+
+
+def read_all(page, seconds, see=str):
+    """Every message, without confirming any, until the connection ends or nothing comes."""
+    while True:
+        see(decode(page.recv(timeout=seconds))[0]["type"])
+
+
+def fetch(viewer, path="", **headers):
+    return urllib.request.urlopen(urllib.request.Request(viewer.url + path, headers=headers))
+
+
+def test_it_serves_the_page_and_nothing_else(served):
+    for name in ("", "main.js", "style.css", "three.module.min.js", "icon.svg"):
+        with fetch(served, name) as answer:
+            assert answer.status == 200
+            assert "default-src 'none'" in answer.headers["Content-Security-Policy"]
+            assert len(answer.read()) == int(answer.headers["Content-Length"])
+    for name in ("../live.py", "__init__.py", "%2e%2e/live.py", "nothing"):
+        with pytest.raises(urllib.error.HTTPError) as caught:
+            fetch(served, name)
+        assert caught.value.code == 404
+        caught.value.close()
+
+
+def test_the_page_asks_nobody_else():
+    for path, file in page_files().items():
+        if path != "/three.module.min.js":
+            text = file.content.decode()
+            assert "https://" not in text.replace('https:" ?', "")
+            assert text.count("http://") == text.count("http://www.w3.org/2000/svg")
+
+
+def test_foreign_pages_are_refused(served):
+    for headers in ({"Origin": "http://evil.example"}, {"Host": "evil.example"}):
+        with pytest.raises(urllib.error.HTTPError) as caught:
+            fetch(served, **headers)
+        assert caught.value.code == 403
+        caught.value.close()
+    with pytest.raises(InvalidStatus) as refused:
+        talk(served, origin="http://evil.example")
+    assert refused.value.response.status_code == 403
+    with talk(served, origin=served.url.rstrip("/")) as page:
+        assert read(page, "hello")[0]["title"] == "small"
+
+
+def test_two_pages_see_the_same_and_one_may_leave(served):
+    with talk(served) as first:
+        read(first, "frame")
+        with talk(served) as second:
+            read(second, "frame")
+            second.send(json.dumps({"type": "play", "on": False}))
+            while read(first, "state")[0]["playing"]:
+                pass
+            second.send(json.dumps({"type": "step", "count": 1}))
+            (one, seen), (two, other) = read(first, "frame"), read(second, "frame")
+            while one["number"] != two["number"]:
+                if one["number"] < two["number"]:
+                    one, seen = read(first, "frame")
+                else:
+                    two, other = read(second, "frame")
+            assert np.array_equal(seen["positions"], other["positions"])
+        first.send(json.dumps({"type": "play", "on": True}))
+        before = read(first, "frame")[0]["time"]
+        assert read(first, "frame")[0]["time"] > before
+
+
+def test_garbage_and_broken_connections_do_no_harm(served):
+    with talk(served) as page:
+        page.send("nonsense")
+        assert "not understood" in read(page, "notice")[0]["text"]
+        page.send(b"\x00\xff" * 100)
+        assert "not understood" in read(page, "notice")[0]["text"]
+    host, port = served.url.removeprefix("http://").rstrip("/").split(":")
+    for junk in (b"", b"\x16\x03\x01\x00", b"GET / HTTP/1.1\r\n", b"POST / HTTP/1.1\r\n\r\n"):
+        with socket.create_connection((host, int(port))) as raw:
+            raw.sendall(junk)
+    with talk(served) as page:
+        read(page, "frame")
+        page.socket.shutdown(socket.SHUT_RDWR)  # without a goodbye
+    with talk(served) as page:
+        read(page, "frame")
+        page.send("x" * (1 << 21))  # larger than any command
+        with pytest.raises(ConnectionClosed, match="1009"):
+            read_all(page, 5)
+    with talk(served) as page:
+        read(page, "frame")
+    deadline = time.monotonic() + 5
+    while served.page_count and time.monotonic() < deadline:
+        time.sleep(0.02)
+    assert served.page_count == 0
+
+
+def test_a_page_that_does_not_confirm_gets_no_more_frames(served):
+    with talk(served) as lazy, talk(served) as other:
+        other.send(json.dumps({"type": "play", "on": True}))
+        for _ in range(10):
+            read(other, "frame")
+        kinds = []
+        with pytest.raises(TimeoutError):
+            read_all(lazy, 0.3, kinds.append)
+        assert kinds.count("frame") <= 2
+
+
+def test_a_taken_port_is_not_the_end(served):
+    taken = int(served.url.rsplit(":", 1)[1].rstrip("/"))
+    with Viewer(lambda: LivePlayer(palpate.Simulation("small")), port=taken) as other:
+        assert other.url != served.url
+        with talk(other) as page:
+            read(page, "frame")
+    with pytest.raises(ViewerError, match=r"203\.0\.113\.1"):
+        Viewer(lambda: LivePlayer(palpate.Simulation("small")), host="203.0.113.1", port=0)

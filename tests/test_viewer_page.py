@@ -1,0 +1,193 @@
+"""The viewer's page in a headless Chromium; without one, only the tests of `test_viewer.py` run."""
+
+import os
+import time
+
+import chromium
+import numpy as np
+import pytest
+
+import palpate
+from palpate.viewer import Viewer
+from palpate.viewer.live import LivePlayer
+
+SIZE = (640, 420)
+
+pytestmark = pytest.mark.skipif(
+    chromium.find() is None and not os.environ.get("CI"), reason="no chromium on this machine"
+)
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory):
+    # Small, since the processor draws; wide enough for the panel.
+    browser = chromium.Chromium(tmp_path_factory.mktemp("profile"), SIZE)
+    yield browser
+    browser.close()
+
+
+@pytest.fixture(scope="module")
+def served():
+    simulation = palpate.Simulation("small")
+    with Viewer(lambda: LivePlayer(simulation), port=0, title="small") as viewer:
+        yield viewer
+
+
+@pytest.fixture(scope="module")
+def opened(browser, served):
+    page = browser.open(served.url)
+    page.wait("globalThis.palpate?.received > 2")
+    yield page
+    assert [url for url in page.requests if not url.startswith(served.url)] == []
+    page.close()
+
+
+@pytest.fixture
+def page(opened):
+    """The page after 0.5 s of simulated time, when the bodies have touched; paused."""
+    opened.run("palpate.send({ type: 'play', on: false }), palpate.send({ type: 'reset' })")
+    opened.wait("palpate.state.playing === false && palpate.last.header.time === 0")
+    opened.run("palpate.send({ type: 'step', count: 30 })")
+    opened.wait("palpate.last.header.time > 0.499")
+    yield opened
+    assert opened.problems == []
+
+
+def picture(page, path):
+    """The page as pixels (rows, columns, 3)."""
+    from matplotlib.image import imread
+
+    page.screenshot(path)
+    return imread(path)[:, :, :3]
+
+
+def place_on_screen(page, body):
+    """Where the middle of a body's nodes is drawn."""
+    return page.run(
+        f"""(() => {{
+          const {{ stage }} = palpate;
+          const body = stage.bodies[{body}];
+          const {{ array }} = body.geometry.attributes.position;
+          const sum = stage.camera.position.clone().set(0, 0, 0), at = sum.clone();
+          for (let i = 0; i < array.length; i += 3) sum.add(at.fromArray(array, i));
+          sum.multiplyScalar(3 / array.length);
+          stage.world.localToWorld(sum).project(stage.camera);
+          return [(sum.x + 1) / 2 * innerWidth, (1 - sum.y) / 2 * innerHeight];
+        }})()"""
+    )
+
+
+def test_bodies_are_seen_and_move_until_paused(page, tmp_path):
+    page.key("r")
+    page.wait("palpate.last.header.time === 0")
+    before = picture(page, tmp_path / "before.png")
+    # Red, yellow and blue: the colours of the model.
+    middle = before[60:-60, 100:-100]
+    for channel, other in ((0, 2), (2, 0)):
+        assert (middle[:, :, channel] > middle[:, :, other] + 0.25).mean() > 0.005
+    page.key(" ")
+    page.wait("palpate.last.header.time > 0.5")
+    page.key(" ")
+    page.wait("palpate.state.playing === false")
+    after = picture(page, tmp_path / "after.png")
+    assert np.abs(after - before)[60:-60, 100:-100].max() > 0.3
+    time.sleep(0.2)
+    stopped = page.run("palpate.last.header.time")
+    time.sleep(0.3)
+    assert page.run("palpate.last.header.time") == stopped
+    page.key("ArrowRight")
+    page.wait(f"palpate.last.header.time > {stopped}")
+    assert page.run("document.querySelector('#transport .time').textContent").endswith("s")
+
+
+def test_what_is_shown_can_be_chosen(page, tmp_path):
+    for key in ("c", "t", "w", "b"):
+        page.key(key)
+    page.wait("palpate.last.arrays.contact_points?.length > 30")
+    page.wait("palpate.overlay.needles.count > 10 && palpate.overlay.boxes.visible")
+    page.run("palpate.set({ wireframe: false, field: 'deformation' })")
+    page.wait("!document.getElementById('legend').hidden && palpate.high > 0")
+    assert "mm" in page.run("document.getElementById('legend').textContent")
+    painted = picture(page, tmp_path / "painted.png")
+    page.run("palpate.set({ field: null })")
+    page.wait("document.getElementById('legend').hidden")
+    assert np.abs(picture(page, tmp_path / "plain.png") - painted).max() > 0.3
+
+
+def test_settings_of_a_body_reach_the_simulation(page):
+    page.run("document.querySelector('.body .who').click()")
+    page.run(
+        """(() => {
+          const input = document.querySelector('.body [aria-label="Stiffness"]');
+          input.value = 25000;
+          input.dispatchEvent(new Event("change"));
+        })()"""
+    )
+    page.wait("palpate.state.bodies[0].material.young === 25000")
+    page.wait("document.querySelector('.body [aria-label=\"Stiffness\"]').value === '25000'")
+
+
+def test_the_camera_turns_with_the_mouse(page):
+    page.run("palpate.setMode('look')")
+    page.run("globalThis.before = palpate.stage.camera.position.clone()")
+    page.mouse("mousePressed", 400, 70)
+    for step in range(5):
+        page.mouse("mouseMoved", 400 + 20 * step, 70)
+    page.mouse("mouseReleased", 480, 70)
+    page.wait("palpate.stage.camera.position.distanceTo(before) > 0.2")
+
+
+def test_tissue_is_dragged(page):
+    page.run("palpate.setMode('pull')")
+    page.key(" ")
+    x, y = place_on_screen(page, 2)
+    page.mouse("mousePressed", x, y)
+    for step in range(1, 9):
+        page.mouse("mouseMoved", x, y - 12 * step)
+        time.sleep(0.03)
+    page.wait("palpate.last.header.pulls.length === 1")
+    page.wait("palpate.last.header.pulls[0].force[2] > 0.02")
+    page.wait("/N$/.test(document.querySelector('#labels .label')?.textContent)")
+    page.mouse("mouseReleased", x, y - 96)
+    page.wait("palpate.last.header.pulls.length === 0")
+
+
+def test_tissue_is_pushed(page):
+    page.run("palpate.setMode('push')")
+    page.key(" ")
+    x, y = place_on_screen(page, 2)
+    page.mouse("mousePressed", x, y)
+    page.wait("Math.hypot(...(palpate.last.header.tool?.force ?? [0])) > 0.01")
+    page.mouse("mouseReleased", x, y)
+    page.wait("palpate.last.header.tool === null")
+
+
+def test_two_pages_and_a_lost_server(browser, page, served):
+    other = browser.open(served.url)
+    other.wait("globalThis.palpate?.received > 0")
+    other.run("palpate.send({ type: 'play', on: false })")
+    page.wait("palpate.state.playing === false")
+    other.close()
+    page.run("palpate.send({ type: 'play', on: true })")
+    page.wait("palpate.state.playing === true")
+    page.run("palpate.source.socket.close()")
+    page.wait("palpate.broken")
+    page.wait("!palpate.broken && palpate.source.socket.readyState === 1")
+    count = page.run("palpate.received")
+    page.wait(f"palpate.received > {count}")
+
+
+def test_a_model_error_is_shown_as_in_the_terminal(browser, tmp_path):
+    path = tmp_path / "broken.bml"
+    path.write_text("BRANCH {\n  TREE { NE small.seg  MT{ yuong 5 } }\n}\n")
+    with pytest.raises(palpate.ModelError) as caught:
+        palpate.read_model(path)
+    with Viewer(lambda: LivePlayer(palpate.Simulation(path)), port=0) as viewer:
+        page = browser.open(viewer.url)
+        page.wait("globalThis.palpate && !document.getElementById('problem').hidden")
+        assert page.run("document.querySelector('#problem pre').textContent") == str(caught.value)
+        path.write_text("BRANCH {\n  TREE { NE small.seg  MT{ young 5000 } }\n}\n")
+        (tmp_path / "small.seg").write_bytes((palpate.model.MODELS / "small.seg").read_bytes())
+        page.run("document.querySelector('#problem button').click()")
+        page.wait("palpate.received > 1 && document.getElementById('problem').hidden")
+        page.close()
