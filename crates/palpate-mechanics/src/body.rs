@@ -37,7 +37,7 @@ pub(crate) struct MovingBody {
     pub(crate) next_velocities: Vec<Point>,
     pub(crate) motion: Motion,
     pub(crate) compliance: ComplianceCache,
-    /// Columns solved in this step.
+    /// Half solutions made in this step.
     pub(crate) new_columns: usize,
     /// Whether contact forces act in this step.
     pub(crate) touched: bool,
@@ -74,7 +74,7 @@ impl MovingBody {
             (BodyKind::Rigid(Box::new(rigid)), ComplianceCache::default())
         } else {
             let elastic = ElasticBody::new(index, body, gravity, time_step)?;
-            let compliance = ComplianceCache::new(&body.mesh);
+            let compliance = ComplianceCache::new(&body.mesh, &elastic);
             (BodyKind::Elastic(Box::new(elastic)), compliance)
         };
         let zero = vec![[0.0; 3]; nodes.len()];
@@ -163,7 +163,7 @@ impl MovingBody {
         Motion { mean, spread: spread.fold(0.0, f64::max), deformation }
     }
 
-    /// Makes the compliance columns of `nodes` available, and of those that forces are expected on.
+    /// Makes the compliance of `nodes` available, and of those that forces are expected on.
     pub(crate) fn prepare_compliance(&mut self, nodes: &[u32], step: u64) {
         self.new_columns = match &mut self.kind {
             BodyKind::Elastic(elastic) => {
@@ -177,7 +177,7 @@ impl MovingBody {
         };
     }
 
-    /// Solves up to `count` compliance columns before they are asked for; returns how many.
+    /// Solves for the compliance of up to `count` nodes before it is asked for; returns how many.
     pub(crate) fn prepare_ahead(&mut self, count: usize) -> usize {
         match &mut self.kind {
             BodyKind::Elastic(elastic) => self.compliance.prepare_ahead(elastic, count),

@@ -1,5 +1,6 @@
 //! The factor of a body's matrix: made once, solved every step.
 
+mod half;
 mod packed;
 mod real;
 mod scalar_matrix;
@@ -17,6 +18,8 @@ use faer::sparse::linalg::{SupernodalThreshold, SymbolicSupernodalParams};
 
 use crate::ordering::{NodeOrder, OrderingMethod};
 use crate::{BlockMatrix, BlockPattern};
+pub use half::{HalfSolution, half_products};
+use half::{HalfWorkspace, NODES, Paths};
 use packed::{PackedFactor, PackedWorkspace};
 use scalar_matrix::ScalarMatrix;
 
@@ -94,6 +97,9 @@ pub struct FactorStats {
 pub struct Cholesky {
     pattern: std::sync::Arc<BlockPattern>,
     order: NodeOrder,
+    /// Place of each node in the order.
+    places: Vec<u32>,
+    paths: Paths,
     scalar: ScalarMatrix,
     symbolic: SymbolicCholesky<u32>,
     values: Vec<f64>,
@@ -121,6 +127,8 @@ struct Probe {
 pub struct SolveWorkspace {
     single: PackedWorkspace<f32>,
     double: PackedWorkspace<f64>,
+    half_single: HalfWorkspace<f32>,
+    half_double: HalfWorkspace<f64>,
 }
 
 /// Calls a method of the packed factor with the workspace of its precision.
@@ -173,10 +181,28 @@ impl Cholesky {
             symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, faer::Spec::default()),
         );
         let values = vec![0.0; symbolic.len_val()];
-        let packed = Packed::Double(PackedFactor::default());
-        let mut result =
-            Self { pattern, order, scalar, symbolic, values, precision, packed, scratch };
+        let mut places = vec![0; order.nodes.len()];
+        for (place, &node) in order.nodes.iter().enumerate() {
+            places[node as usize] = place as u32;
+        }
+        let mut result = Self {
+            pattern,
+            order,
+            places,
+            paths: Paths::default(),
+            scalar,
+            symbolic,
+            values,
+            precision,
+            packed: Packed::Double(PackedFactor::default()),
+            scratch,
+        };
         result.refactor(matrix)?;
+        let count = result.order.nodes.len();
+        result.paths = match &result.packed {
+            Packed::Single(packed) => Paths::new(packed, count),
+            Packed::Double(packed) => Paths::new(packed, count),
+        };
         Ok(result)
     }
 
@@ -296,18 +322,66 @@ impl Cholesky {
         solve!(self, workspace, solve_three_in_place, sides);
     }
 
-    /// Solves for the three unit forces on `node`: `columns[i][3 * axis + k]` is the displacement
-    /// of node i along k under a unit force along `axis`. No allocation.
+    /// Half solutions of `nodes`, one each in `halves`, for [`half_products`]. Nodes next to each other
+    /// in the order of elimination are cheaper together. Allocates where a half solution has to grow.
     ///
     /// # Panics
-    /// If `columns` has not one entry per node.
-    pub fn solve_node(
+    /// If a node does not exist, or there is not one half solution per node.
+    pub fn half_solve(
         &self,
-        node: usize,
-        columns: &mut [[f64; 9]],
+        nodes: &[u32],
+        halves: &mut [HalfSolution],
         workspace: &mut SolveWorkspace,
     ) {
-        solve!(self, workspace, solve_node, node, columns);
+        assert_eq!(nodes.len(), halves.len(), "one half solution per node");
+        for (nodes, halves) in nodes.chunks(NODES).zip(halves.chunks_mut(NODES)) {
+            let mut places = [0; NODES];
+            for (place, &node) in places.iter_mut().zip(nodes) {
+                *place = self.places[node as usize];
+            }
+            let places = &places[..nodes.len()];
+            match &self.packed {
+                Packed::Single(packed) => {
+                    packed.half_solve(&self.paths, places, halves, &mut workspace.half_single);
+                }
+                Packed::Double(packed) => {
+                    packed.half_solve(&self.paths, places, halves, &mut workspace.half_double);
+                }
+            }
+        }
+    }
+
+    /// Bytes of the half solution of a node.
+    ///
+    /// # Panics
+    /// If the node does not exist.
+    pub fn half_bytes(&self, node: usize) -> usize {
+        self.paths.half_bytes(self.places[node] as usize)
+    }
+
+    /// Place of a node in the order of elimination.
+    ///
+    /// # Panics
+    /// If the node does not exist.
+    pub fn elimination_place(&self, node: usize) -> usize {
+        self.places[node] as usize
+    }
+
+    /// Writes the length that half solutions have in common with that of `node`, by the branch
+    /// ([`Cholesky::branch`]) of the other node.
+    ///
+    /// # Panics
+    /// If the node does not exist.
+    pub fn common_lengths(&self, node: usize, lengths: &mut Vec<u32>) {
+        self.paths.common_lengths(self.places[node] as usize, lengths);
+    }
+
+    /// The branch of the elimination tree that a node is on.
+    ///
+    /// # Panics
+    /// If the node does not exist.
+    pub fn branch(&self, node: usize) -> usize {
+        self.paths.branch(self.places[node] as usize)
     }
 
     /// Size and cost.

@@ -11,7 +11,9 @@ pub mod ordering;
 pub mod rows;
 
 pub use block_matrix::{BlockMatrix, BlockPattern};
-pub use cholesky::{Cholesky, FactorError, FactorStats, Precision, SolveWorkspace};
+pub use cholesky::{
+    Cholesky, FactorError, FactorStats, HalfSolution, Precision, SolveWorkspace, half_products,
+};
 pub use dense::DenseCholesky;
 pub use ordering::{NodeOrder, OrderingMethod};
 pub use rows::add_rows;

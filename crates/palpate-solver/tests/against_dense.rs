@@ -3,7 +3,10 @@
 #![allow(clippy::needless_range_loop)] // matrices read best by row and column
 use std::sync::Arc;
 
-use palpate_solver::{BlockMatrix, BlockPattern, Cholesky, DenseCholesky, FactorError, Precision};
+use palpate_solver::{
+    BlockMatrix, BlockPattern, Cholesky, DenseCholesky, FactorError, HalfSolution, Precision,
+    half_products,
+};
 use proptest::prelude::*;
 
 /// A random symmetric matrix on `cliques`, made positive definite by diagonal dominance.
@@ -135,15 +138,33 @@ proptest! {
             prop_assert!(largest_difference(alone.as_flattened(), column.as_flattened()) < 1e-12);
         }
 
-        let node = seed as usize % node_count;
-        let mut columns = vec![[0.0; 9]; node_count];
-        factor.solve_node(node, &mut columns, &mut workspace);
-        for axis in 0..3 {
-            let mut unit = vec![[0.0; 3]; node_count];
-            unit[node][axis] = 1.0;
-            factor.solve_in_place(&mut unit, &mut workspace);
-            let column: Vec<f64> = columns.iter().flat_map(|c| c[3 * axis..][..3].to_vec()).collect();
-            prop_assert!(largest_difference(unit.as_flattened(), &column) < 1e-12);
+        // Every second node; the other way round as well.
+        let nodes: Vec<u32> = (0..node_count as u32).filter(|node| node % 2 == 0).collect();
+        let mut halves = vec![HalfSolution::default(); nodes.len()];
+        factor.half_solve(&nodes, &mut halves, &mut workspace);
+        let mut lengths = Vec::new();
+        for (&loaded, half) in nodes.iter().zip(&halves) {
+            factor.common_lengths(loaded as usize, &mut lengths);
+            let common = |node: u32| lengths[factor.branch(node as usize)];
+            let pairs = nodes.iter().zip(&halves).map(|(&node, other)| ([other, half], common(node)));
+            let mut found = Vec::new();
+            half_products(pairs, |product| found.push(product));
+            let pairs = nodes.iter().zip(&halves).map(|(&node, other)| ([half, other], common(node)));
+            let mut turned = Vec::new();
+            half_products(pairs, |product| turned.push(product));
+            for axis in 0..3 {
+                let mut unit = vec![[0.0; 3]; node_count];
+                unit[loaded as usize][axis] = 1.0;
+                factor.solve_in_place(&mut unit, &mut workspace);
+                let size = largest_difference(unit.as_flattened(), &vec![0.0; 3 * node_count]);
+                for (&moved, (found, turned)) in nodes.iter().zip(found.iter().zip(&turned)) {
+                    for k in 0..3 {
+                        let error = f64::from(found[3 * axis + k]) - unit[moved as usize][k];
+                        prop_assert!(error.abs() < 2e-6 * size, "{error} of {size}");
+                        prop_assert_eq!(found[3 * axis + k], turned[3 * k + axis]);
+                    }
+                }
+            }
         }
     }
 }
@@ -253,4 +274,28 @@ fn single_precision_is_close_and_gives_way_to_double_where_it_is_not() {
     let double = Cholesky::new(&matrix).unwrap();
     assert_eq!(single.stats().bytes, double.stats().bytes);
     assert_eq!(solved(&single), solved(&double));
+}
+
+#[test]
+fn half_solutions_do_not_depend_on_what_is_solved_with_them() {
+    let (node_count, cliques) = grid(8);
+    let matrix = dominant(node_count, &cliques, &mut draws(7));
+    for precision in [Precision::Single, Precision::Double] {
+        let factor = Cholesky::with_precision(&matrix, precision).unwrap();
+        let mut workspace = factor.workspace();
+        let nodes: Vec<u32> = (0..node_count as u32).collect();
+        let mut all = vec![HalfSolution::default(); node_count];
+        factor.half_solve(&nodes, &mut all, &mut workspace);
+        let mut rest = &nodes[..];
+        for count in [1, 2, 3, 5, 6, 8, 11, 16, 20].into_iter().cycle() {
+            let (some, others) = rest.split_at(count.min(rest.len()));
+            let mut halves = vec![HalfSolution::default(); some.len()];
+            factor.half_solve(some, &mut halves, &mut workspace);
+            assert!(halves[..] == all[some[0] as usize..][..some.len()], "{some:?}");
+            rest = others;
+            if rest.is_empty() {
+                break;
+            }
+        }
+    }
 }

@@ -20,7 +20,7 @@ mod system;
 use glam::{DMat3, DVec3};
 use palpate_geometry::Point;
 use palpate_model::{Body, Law};
-use palpate_solver::{BlockMatrix, Cholesky, FactorStats, Precision};
+use palpate_solver::{BlockMatrix, Cholesky, FactorStats, HalfSolution, Precision};
 
 use super::frame::best_rotation;
 use super::inertia::Inertia;
@@ -155,17 +155,42 @@ impl ElasticBody {
         self.factor.stats()
     }
 
-    /// Solves for the three unit forces on `node`, which must be free; read the result with
-    /// [`ElasticBody::compliance`].
-    pub(crate) fn solve_compliance(&mut self, node: u32) {
-        let place = self.free_index[node as usize] as usize;
-        self.factor.solve_node(place, &mut self.step.columns, &mut self.step.workspace);
+    /// Half solutions of `nodes`, which must be free, in the frame: see [`Cholesky::half_solve`].
+    pub(crate) fn half_solve(&mut self, nodes: &[u32], halves: &mut [HalfSolution]) {
+        let places = &mut self.step.places;
+        places.clear();
+        places.extend(nodes.iter().map(|&node| self.free_index[node as usize]));
+        self.factor.half_solve(places, halves, &mut self.step.workspace);
     }
 
-    /// Displacement in the frame of every free node under the three unit forces: entry
-    /// `3 * axis + k` is along k under the force along axis [m/N].
-    pub(crate) fn compliance(&self) -> &[[f64; 9]] {
-        &self.step.columns
+    /// Place of a node in the order of elimination; fixed nodes come last.
+    pub(crate) fn elimination_place(&self, node: u32) -> usize {
+        let place = self.free_place(node);
+        place.map_or(usize::MAX, |place| self.factor.elimination_place(place))
+    }
+
+    /// Bytes of the half solution of a node, which must be free.
+    pub(crate) fn half_bytes(&self, node: u32) -> usize {
+        self.factor.half_bytes(self.free_index[node as usize] as usize)
+    }
+
+    /// See [`Cholesky::common_lengths`].
+    pub(crate) fn common_lengths(&self, node: u32, lengths: &mut Vec<u32>) {
+        self.factor.common_lengths(self.free_index[node as usize] as usize, lengths);
+    }
+
+    /// See [`Cholesky::branch`].
+    pub(crate) fn branch(&self, node: u32) -> usize {
+        self.factor.branch(self.free_index[node as usize] as usize)
+    }
+
+    /// Displacement of every free node under a unit force on a free node along an axis of the frame.
+    #[cfg(test)]
+    pub(crate) fn column(&mut self, node: u32, axis: usize) -> Vec<[f64; 3]> {
+        let mut column = vec![[0.0; 3]; self.free_nodes.len()];
+        column[self.free_index[node as usize] as usize][axis] = 1.0;
+        self.factor.solve_in_place(&mut column, &mut self.step.workspace);
+        column
     }
 
     /// Where a node is among the free ones; `None` when it is fixed.

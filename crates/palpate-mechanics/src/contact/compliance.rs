@@ -1,28 +1,33 @@
-//! Displacements of a body's surface under unit forces on its nodes, in the body's frame.
+//! What a body's nodes answer to forces, as half solutions of its matrix.
 //!
-//! A column that was solved once serves every later step, until the body's matrix is made anew. Columns
-//! are single precision: they shape the contact forces, whose response is solved in double precision.
-//! The matrix is symmetric: of each column only the part from the node itself on is kept.
+//! The displacement of one node under forces on another is the product of their half solutions, which
+//! cost a part of the forward pass of a solve each and serve every later step, until the body's matrix is
+//! made anew. They are single precision: they shape the contact forces, whose response is solved in
+//! full.
 
 use palpate_model::Mesh;
+use palpate_solver::HalfSolution;
 
 use crate::body::ElasticBody;
 
-/// Bytes of columns per body beyond which those of nodes without contact are given up.
+/// Bytes per body beyond which half solutions of nodes without contact are given up.
 const MEMORY_LIMIT: usize = 128 << 20;
 
 const NONE: u32 = u32::MAX;
 
-/// Compliance columns of one body.
+/// Half solutions of one body.
 #[derive(Debug, Default)]
 pub(crate) struct ComplianceCache {
-    /// Node -> place among the surface nodes.
-    surface_index: Vec<u32>,
     surface_nodes: Vec<u32>,
     /// Node -> slot.
     slot_of: Vec<u32>,
     slots: Vec<Slot>,
-    /// Bytes of all columns, and beyond which those of nodes without contact are given up.
+    halves: Vec<HalfSolution>,
+    /// Memory of half solutions that were given up.
+    spare: Vec<HalfSolution>,
+    /// Nodes that are to be solved for.
+    wanted: Vec<u32>,
+    /// Bytes of all half solutions, and beyond which those of nodes without contact are given up.
     size: usize,
     limit: usize,
     /// Surface nodes before this one have been solved ahead.
@@ -30,24 +35,18 @@ pub(crate) struct ComplianceCache {
     version: u64,
 }
 
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug)]
 struct Slot {
     node: u32,
     last_used: u64,
-    /// Entries of the surface nodes from the column's own on.
-    column: Vec<[f32; 9]>,
 }
 
 impl ComplianceCache {
-    pub(crate) fn new(mesh: &Mesh) -> Self {
-        let surface_nodes = mesh.surface_nodes().to_vec();
-        let mut surface_index = vec![NONE; mesh.nodes().len()];
-        for (place, &node) in surface_nodes.iter().enumerate() {
-            surface_index[node as usize] = place as u32;
-        }
-        let slot_of = vec![NONE; surface_index.len()];
-        let limit = MEMORY_LIMIT;
-        Self { surface_index, surface_nodes, slot_of, limit, ..Self::default() }
+    pub(crate) fn new(mesh: &Mesh, body: &ElasticBody) -> Self {
+        let slot_of = vec![NONE; mesh.nodes().len()];
+        let mut surface_nodes = mesh.surface_nodes().to_vec();
+        surface_nodes.sort_by_key(|&node| body.elimination_place(node));
+        Self { surface_nodes, slot_of, limit: MEMORY_LIMIT, ..Self::default() }
     }
 
     /// With another limit than the usual one.
@@ -56,76 +55,74 @@ impl ComplianceCache {
         self.limit = bytes;
     }
 
-    /// Gives up all columns: the matrix has changed.
+    /// Gives up everything: the matrix has changed.
     pub(crate) fn clear(&mut self) {
         self.slot_of.fill(NONE);
         self.slots.clear();
+        self.spare.append(&mut self.halves);
         (self.size, self.ahead) = (0, 0);
         self.version += 1;
     }
 
-    /// Counts how often the columns were given up.
+    /// Counts how often everything was given up.
     pub(crate) fn version(&self) -> u64 {
         self.version
     }
 
-    /// Makes the columns of `nodes` available; returns how many had to be solved.
+    /// Makes the half solutions of `nodes` available; returns how many had to be solved.
     pub(crate) fn prepare(&mut self, body: &mut ElasticBody, nodes: &[u32], step: u64) -> usize {
+        self.wanted.clear();
         for &node in nodes {
             if let Some(slot) = self.slots.get_mut(self.slot_of[node as usize] as usize) {
                 slot.last_used = step;
+            } else if body.free_place(node).is_some() {
+                self.wanted.push(node);
             }
         }
-        let mut solved = 0;
-        for &node in nodes {
-            if self.slot_of[node as usize] == NONE && body.free_place(node).is_some() {
-                self.make_room(self.column_size(node), step);
-                self.solve(body, node, step);
-                solved += 1;
-            }
-        }
-        solved
+        self.solve_wanted(body, step)
     }
 
-    /// Solves up to `count` columns that no step has asked for yet; returns how many that were, fewer
-    /// only when the memory is full or every column is known.
+    /// Solves for up to `count` surface nodes that no step has asked for yet; returns how many that
+    /// were, fewer only when the memory is full or every surface node is known.
     pub(crate) fn prepare_ahead(&mut self, body: &mut ElasticBody, count: usize) -> usize {
-        let mut solved = 0;
-        while solved < count && self.ahead < self.surface_nodes.len() {
+        self.wanted.clear();
+        let mut size = self.size;
+        while self.wanted.len() < count && self.ahead < self.surface_nodes.len() {
             let node = self.surface_nodes[self.ahead];
             if self.slot_of[node as usize] == NONE && body.free_place(node).is_some() {
-                if self.size + self.column_size(node) > self.limit {
+                size += body.half_bytes(node);
+                if size > self.limit {
                     break;
                 }
-                self.solve(body, node, 0);
-                solved += 1;
+                self.wanted.push(node);
             }
             self.ahead += 1;
         }
-        solved
+        self.solve_wanted(body, 0)
     }
 
-    fn column_size(&self, node: u32) -> usize {
-        size_of::<[f32; 9]>()
-            * (self.surface_nodes.len() - self.surface_index[node as usize] as usize)
+    fn solve_wanted(&mut self, body: &mut ElasticBody, step: u64) -> usize {
+        let mut wanted = std::mem::take(&mut self.wanted);
+        // What is next to each other in the order of elimination is solved together.
+        wanted.sort_unstable_by_key(|&node| body.elimination_place(node));
+        wanted.dedup();
+        let size = wanted.iter().map(|&node| body.half_bytes(node)).sum();
+        self.make_room(body, size, step);
+        self.size += size;
+        for &node in &wanted {
+            self.slot_of[node as usize] = self.slots.len() as u32;
+            self.slots.push(Slot { node, last_used: step });
+            self.halves.push(self.spare.pop().unwrap_or_default());
+        }
+        let first = self.halves.len() - wanted.len();
+        body.half_solve(&wanted, &mut self.halves[first..]);
+        self.wanted = wanted;
+        self.wanted.len()
     }
 
-    fn solve(&mut self, body: &mut ElasticBody, node: u32, step: u64) {
-        body.solve_compliance(node);
-        let others = &self.surface_nodes[self.surface_index[node as usize] as usize..];
-        let entries = others.iter().map(|&other| {
-            let place = body.free_place(other);
-            place.map_or([0.0; 9], |place| body.compliance()[place].map(|x| x as f32))
-        });
-        let slot = Slot { node, last_used: step, column: entries.collect() };
-        self.size += size_of_val(&*slot.column);
-        self.slot_of[node as usize] = self.slots.len() as u32;
-        self.slots.push(slot);
-    }
-
-    /// Gives up columns, those unused for longest first, until one of `size` bytes has room or all
-    /// that are left are used in this step.
-    fn make_room(&mut self, size: usize, step: u64) {
+    /// Gives up half solutions, those unused for longest first, until one of `size` bytes has room or
+    /// all that are left are used in this step.
+    fn make_room(&mut self, body: &ElasticBody, size: usize, step: u64) {
         while self.size + size > self.limit {
             let slots = self.slots.iter().enumerate();
             let oldest = slots.min_by_key(|(_, slot)| (slot.last_used, slot.node));
@@ -133,7 +130,8 @@ impl ComplianceCache {
                 return;
             };
             let given_up = self.slots.swap_remove(place);
-            self.size -= size_of_val(&*given_up.column);
+            self.spare.push(self.halves.swap_remove(place));
+            self.size -= body.half_bytes(given_up.node);
             self.slot_of[given_up.node as usize] = NONE;
             if let Some(moved) = self.slots.get(place) {
                 self.slot_of[moved.node as usize] = place as u32;
@@ -141,12 +139,8 @@ impl ComplianceCache {
         }
     }
 
-    /// Displacement of node `second` under unit forces on `first`, which must not be the larger one:
-    /// entry `3 * axis + k` is along k under the force along axis [m/N]. `None` if the column is not
-    /// known.
-    pub(crate) fn entry(&self, first: u32, second: u32) -> Option<&[f32; 9]> {
-        let [own, other] = [first, second].map(|node| self.surface_index[node as usize]);
-        let slot = self.slots.get(self.slot_of[first as usize] as usize)?;
-        Some(&slot.column[(other - own) as usize])
+    /// The half solution of a node, if it is known.
+    pub(crate) fn half(&self, node: u32) -> Option<&HalfSolution> {
+        self.halves.get(self.slot_of[node as usize] as usize)
     }
 }

@@ -107,7 +107,7 @@ impl Coupling {
         Self { nodes, contacts: (0..count as u32).map(corners).collect(), ..Self::default() }
     }
 
-    /// Takes in the compliance of `nodes`, whose columns must be prepared, and the `forces` on some of
+    /// Takes in the compliance of `nodes`, which must be prepared, and the `forces` on some of
     /// them, in the frame, for [`Coupling::displacement`].
     pub(super) fn assemble(
         &mut self,
@@ -115,8 +115,10 @@ impl Coupling {
         nodes: &[u32],
         forces: impl Iterator<Item = (u32, DVec3)>,
     ) {
-        self.nodes.gather(&body.compliance, body.positions.len(), nodes);
-        let turning = body.elastic().and_then(|elastic| elastic.turning());
+        let turning = body.elastic().and_then(|elastic| {
+            self.nodes.gather(elastic, &body.compliance, nodes);
+            elastic.turning()
+        });
         for corners in &mut self.contacts {
             for place in 0..corners.count as usize {
                 corners.slots[place] = self.nodes.slot(corners.nodes[place]) as u32;

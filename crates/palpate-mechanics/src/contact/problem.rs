@@ -2,7 +2,7 @@
 //!
 //! With implicit penalty the step minimises `|x - x_free|²_A / 2 + sum of penalty energies`. Its
 //! dual has one unknown force per contact and direction: `(D + W) lambda = s` over the contacts that
-//! push, with `W = J P J^T` from compliance columns. It is small and well conditioned however stiff
+//! push, with `W = J P J^T` from half solutions. It is small and well conditioned however stiff
 //! the penalty is, and forces J^T lambda are equal and opposite exactly, converged or not.
 //!
 //! W is never put together: contacts couple through the bodies that they share, each in its frame.
@@ -110,7 +110,7 @@ impl Problem {
         &self.bodies[body].nodes
     }
 
-    /// Writes the equations of the candidates. Every compliance column must be prepared.
+    /// Writes the equations of the candidates. The compliance of all nodes must be prepared.
     pub(crate) fn assemble<'a>(
         &mut self,
         candidates: &[Candidate],

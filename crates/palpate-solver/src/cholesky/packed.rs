@@ -17,31 +17,31 @@ use pulp::Simd;
 use super::real::Real;
 
 /// Rows of a panel: one to eight vectors of any machine and precision.
-const ROWS: usize = 32;
+pub(super) const ROWS: usize = 32;
 /// Running sums per column in the backward pass: the longest vector.
 const LANES: usize = 16;
 
-type Panel<T> = [T; ROWS];
+pub(super) type Panel<T> = [T; ROWS];
 
 #[derive(Clone, Copy, Debug)]
-struct Supernode {
+pub(super) struct Supernode {
     start: u32,
     width: u32,
     pattern_start: u32,
     pattern_end: u32,
-    panel_start: u32,
+    pub(super) panel_start: u32,
 }
 
 impl Supernode {
-    fn columns(self) -> std::ops::Range<usize> {
+    pub(super) fn columns(self) -> std::ops::Range<usize> {
         self.start as usize..(self.start + self.width) as usize
     }
 
-    fn pattern(self) -> std::ops::Range<usize> {
+    pub(super) fn pattern(self) -> std::ops::Range<usize> {
         self.pattern_start as usize..self.pattern_end as usize
     }
 
-    fn row_count(self) -> usize {
+    pub(super) fn row_count(self) -> usize {
         (self.width + self.pattern_end - self.pattern_start) as usize
     }
 }
@@ -49,12 +49,14 @@ impl Supernode {
 /// The packed factor of one matrix.
 #[derive(Debug, Default)]
 pub(super) struct PackedFactor<T> {
-    supernodes: Vec<Supernode>,
-    pattern: Vec<u32>,
-    panels: Vec<Panel<T>>,
-    size: usize,
+    pub(super) supernodes: Vec<Supernode>,
+    pub(super) pattern: Vec<u32>,
+    pub(super) panels: Vec<Panel<T>>,
+    /// Rows and columns.
+    pub(super) size: usize,
     widest: usize,
-    longest: usize,
+    /// Rows of the longest supernode, whole panels.
+    pub(super) longest: usize,
 }
 
 /// Memory for solves with one packed factor, for one thread.
@@ -135,7 +137,7 @@ impl<T: Real> PackedFactor<T> {
         for (x, &node) in work.x.as_chunks_mut::<3>().0.iter_mut().zip(order) {
             *x = rhs[node as usize].map(T::from_f64);
         }
-        pulp::Arch::new().dispatch(Passes::<T, 1> { factor: self, work, first: 0 });
+        pulp::Arch::new().dispatch(Passes::<T, 1> { factor: self, work });
         for (x, &node) in work.x.as_chunks::<3>().0.iter().zip(order) {
             rhs[node as usize] = x.map(T::to_f64);
         }
@@ -154,7 +156,7 @@ impl<T: Real> PackedFactor<T> {
             let sides = [&first[node as usize], &second[node as usize]];
             *x = std::array::from_fn(|entry| T::from_f64(sides[entry % 2][entry / 2]));
         }
-        pulp::Arch::new().dispatch(Passes::<T, 2> { factor: self, work, first: 0 });
+        pulp::Arch::new().dispatch(Passes::<T, 2> { factor: self, work });
         for (x, &node) in work.x.as_chunks::<6>().0.iter().zip(order) {
             first[node as usize] = std::array::from_fn(|axis| x[2 * axis].to_f64());
             second[node as usize] = std::array::from_fn(|axis| x[2 * axis + 1].to_f64());
@@ -173,53 +175,22 @@ impl<T: Real> PackedFactor<T> {
             let side = &sides[node as usize];
             *x = std::array::from_fn(|entry| T::from_f64(side[3 * (entry % 3) + entry / 3]));
         }
-        pulp::Arch::new().dispatch(Passes::<T, 3> { factor: self, work, first: 0 });
+        pulp::Arch::new().dispatch(Passes::<T, 3> { factor: self, work });
         for (x, &node) in work.x.as_chunks::<9>().0.iter().zip(order) {
             let value = |entry: usize| x[3 * (entry % 3) + entry / 3].to_f64();
             sides[node as usize] = std::array::from_fn(value);
         }
     }
 
-    pub(super) fn solve_node(
-        &self,
-        order: &[u32],
-        node: usize,
-        columns: &mut [[f64; 9]],
-        work: &mut PackedWorkspace<T>,
-    ) {
-        assert_eq!(columns.len(), order.len(), "one entry per node");
-        self.fit(work);
-        let Some(place) = order.iter().position(|&other| other as usize == node) else {
-            columns.fill([0.0; 9]);
-            return;
-        };
-        work.x.fill(T::ZERO);
-        for axis in 0..3 {
-            work.x[3 * (3 * place + axis) + axis] = T::from_f64(1.0);
-        }
-        pulp::Arch::new().dispatch(Passes::<T, 3> { factor: self, work, first: 3 * place });
-        for (x, &node) in work.x.as_chunks::<9>().0.iter().zip(order) {
-            let value = |entry: usize| x[3 * (entry % 3) + entry / 3].to_f64();
-            columns[node as usize] = std::array::from_fn(value);
-        }
-    }
-
-    /// Columns before `first` of the right-hand sides are zero.
     #[allow(clippy::inline_always)] // compiled for the vector unit that `dispatch` found
     #[inline(always)]
-    fn forward<S: Simd, const K: usize>(
-        &self,
-        simd: S,
-        work: &mut PackedWorkspace<T>,
-        first: usize,
-    ) {
+    fn forward<S: Simd, const K: usize>(&self, simd: S, work: &mut PackedWorkspace<T>) {
         let x = work.x.as_chunks_mut::<K>().0;
-        let begin = self.supernodes.partition_point(|node| node.columns().end <= first);
-        for supernode in &self.supernodes[begin..] {
+        for supernode in &self.supernodes {
             let width = supernode.width as usize;
             let top = &mut work.top.as_chunks_mut::<K>().0[..width];
             top.copy_from_slice(&x[supernode.columns()]);
-            if K > 1 && top.as_flattened().iter().all(|&value| value == T::ZERO) {
+            if top.as_flattened().iter().all(|&value| value == T::ZERO) {
                 continue;
             }
             let rows = work.rows.as_chunks_mut::<K>().0;
@@ -289,8 +260,6 @@ impl<T: Real> PackedFactor<T> {
 struct Passes<'a, T, const K: usize> {
     factor: &'a PackedFactor<T>,
     work: &'a mut PackedWorkspace<T>,
-    /// Columns before this one of the right-hand sides are zero.
-    first: usize,
 }
 
 impl<T: Real, const K: usize> pulp::WithSimd for Passes<'_, T, K> {
@@ -299,7 +268,7 @@ impl<T: Real, const K: usize> pulp::WithSimd for Passes<'_, T, K> {
     #[allow(clippy::inline_always)] // as `forward`
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        self.factor.forward::<S, K>(simd, self.work, self.first);
+        self.factor.forward::<S, K>(simd, self.work);
         self.factor.backward::<S, K>(simd, self.work);
     }
 }

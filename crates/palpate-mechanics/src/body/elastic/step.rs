@@ -32,7 +32,6 @@ pub(super) struct Step {
     expected: Vec<[f64; 3]>,
     /// Response to the change of contact forces [m].
     response: Vec<[f64; 3]>,
-    pub(super) columns: Vec<[f64; 9]>,
     /// Rotations of the predicted positions of an unattached body.
     rotations: Rotations,
     /// Whether loads turn the body by these rotations alone.
@@ -43,6 +42,8 @@ pub(super) struct Step {
     /// Whether contact forces act in this step.
     touched: bool,
     pub(super) workspace: SolveWorkspace,
+    /// Where the nodes of half solutions are among the free ones.
+    pub(super) places: Vec<u32>,
 }
 
 impl Step {
@@ -64,13 +65,13 @@ impl Step {
             correction: vec![[0.0; 3]; free_count],
             expected: vec![[0.0; 3]; free_count],
             response: vec![[0.0; 3]; free_count],
-            columns: vec![[0.0; 9]; free_count],
             rotations: Rotations::default(),
             turns: false,
             turning: Turning::default(),
             turning_known: false,
             touched: false,
             workspace,
+            places: Vec::new(),
         }
     }
 }

@@ -1,0 +1,308 @@
+//! Half solutions: the forward pass alone, for unit forces on a few nodes.
+//!
+//! With `A = L Lᵀ` and `Y_i = L⁻¹ E_i` for the three unit forces on node i, the displacement of node i
+//! under forces on node j is `Y_iᵀ Y_j`. `Y_i` is zero except along the path of the elimination tree
+//! from the node to the root, so that it is short and costs a part of the forward pass; a column of A⁻¹
+//! needs a whole backward pass on top. Two paths are the same from where they meet to the root.
+//!
+//! A half solution is stored from the root on, every supernode's part filled up with zeros to whole
+//! vectors, so that what two have in common is the beginning of both.
+
+use pulp::Simd;
+
+use super::packed::{PackedFactor, Panel, ROWS};
+use super::real::Real;
+
+/// Right-hand sides that go through the tree together: a whole number of vectors of any machine, and a
+/// whole number of nodes.
+const SIDES: usize = 48;
+pub(super) const NODES: usize = SIDES / 3;
+/// Whole vectors of f32 of any machine.
+const LANES: usize = 16;
+const NONE: u32 = u32::MAX;
+
+/// L⁻¹ times the three unit forces on a node.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct HalfSolution {
+    /// Axis after axis.
+    values: Vec<f32>,
+}
+
+impl HalfSolution {
+    /// Memory that it takes.
+    pub fn bytes(&self) -> usize {
+        size_of_val(&*self.values)
+    }
+
+    fn axis(&self, axis: usize) -> &[f32] {
+        let length = self.values.len() / 3;
+        &self.values[axis * length..][..length]
+    }
+}
+
+/// Displacements of node `moved` under unit forces on node `loaded`, for each pair of their half
+/// solutions and what they have in common ([`super::Cholesky::common_lengths`]): entry `3 * axis + k`
+/// is along k under the force along axis. The bits are those of the transpose for the pair turned
+/// round.
+///
+/// # Panics
+/// If half solutions are shorter than what they have in common.
+pub fn half_products<'a>(
+    pairs: impl Iterator<Item = ([&'a HalfSolution; 2], u32)>,
+    store: impl FnMut([f32; 9]),
+) {
+    pulp::Arch::new().dispatch(Products { pairs, store });
+}
+
+struct Products<I, F> {
+    pairs: I,
+    store: F,
+}
+
+impl<'a, I, F> pulp::WithSimd for Products<I, F>
+where
+    I: Iterator<Item = ([&'a HalfSolution; 2], u32)>,
+    F: FnMut([f32; 9]),
+{
+    type Output = ();
+
+    #[allow(clippy::inline_always)] // compiled for the vector unit that `dispatch` found
+    #[inline(always)]
+    fn with_simd<S: Simd>(mut self, simd: S) {
+        for ([moved, loaded], common) in self.pairs {
+            let moved = [0, 1, 2].map(|k| S::as_simd_f32s(&moved.axis(k)[..common as usize]).0);
+            let loaded = [0, 1, 2].map(|k| S::as_simd_f32s(&loaded.axis(k)[..common as usize]).0);
+            let mut sums = [simd.splat_f32s(0.0); 9];
+            let vectors = (moved[0].iter().zip(moved[1]).zip(moved[2]))
+                .zip(loaded[0].iter().zip(loaded[1]).zip(loaded[2]));
+            for (((&ax, &ay), &az), ((&bx, &by), &bz)) in vectors {
+                let (a, b) = ([ax, ay, az], [bx, by, bz]);
+                for axis in 0..3 {
+                    for k in 0..3 {
+                        sums[3 * axis + k] = simd.mul_add_f32s(a[k], b[axis], sums[3 * axis + k]);
+                    }
+                }
+            }
+            let mut result = [0.0; 9];
+            for (value, sum) in result.iter_mut().zip(sums) {
+                *value = simd.reduce_sum_f32s(sum);
+            }
+            (self.store)(result);
+        }
+    }
+}
+
+/// Where the parts of half solutions stand: the tree of supernodes.
+#[derive(Debug, Default)]
+pub(super) struct Paths {
+    parents: Vec<u32>,
+    /// Begin and end of each supernode's part.
+    parts: Vec<(u32, u32)>,
+    /// Supernode of each node, in the order of elimination.
+    of_node: Vec<u32>,
+}
+
+impl Paths {
+    pub(super) fn new<T: Real>(factor: &PackedFactor<T>, node_count: usize) -> Self {
+        let supernodes = &factor.supernodes;
+        let of_column =
+            |column: u32| supernodes.partition_point(|s| s.columns().end <= column as usize) as u32;
+        let first_below = |s: &super::packed::Supernode| {
+            factor.pattern[s.pattern()].first().map_or(NONE, |&row| of_column(row))
+        };
+        let parents: Vec<u32> = supernodes.iter().map(first_below).collect();
+        let mut parts = vec![(0, 0); supernodes.len()];
+        for (index, supernode) in supernodes.iter().enumerate().rev() {
+            let begin =
+                parents.get(index).filter(|&&p| p != NONE).map_or(0, |&p| parts[p as usize].1);
+            let width = supernode.columns().len().next_multiple_of(LANES);
+            parts[index] = (begin, begin + width as u32);
+        }
+        let of_node = (0..node_count as u32).map(|node| of_column(3 * node)).collect();
+        Self { parents, parts, of_node }
+    }
+
+    fn up(&self, from: u32) -> impl Iterator<Item = u32> + '_ {
+        let next = |&s: &u32| Some(self.parents[s as usize]).filter(|&parent| parent != NONE);
+        std::iter::successors(Some(from), next)
+    }
+
+    /// Writes, by the branch of the other node, what half solutions have in common with that at `place`.
+    pub(super) fn common_lengths(&self, place: usize, lengths: &mut Vec<u32>) {
+        lengths.clear();
+        lengths.resize(self.parents.len(), 0);
+        let mut root = 0;
+        for s in self.up(self.of_node[place]) {
+            lengths[s as usize] = self.parts[s as usize].1;
+            root = s as usize;
+        }
+        // Parents come after their children: from the root down.
+        for s in (0..root).rev() {
+            let parent = self.parents[s];
+            if lengths[s] == 0 && parent != NONE {
+                lengths[s] = lengths[parent as usize];
+            }
+        }
+    }
+
+    pub(super) fn half_bytes(&self, place: usize) -> usize {
+        3 * self.parts[self.of_node[place] as usize].1 as usize * size_of::<f32>()
+    }
+
+    /// Branch of the tree that the node at `place` is on.
+    pub(super) fn branch(&self, place: usize) -> usize {
+        self.of_node[place] as usize
+    }
+}
+
+/// Memory for half solutions with one packed factor.
+#[derive(Debug, Default)]
+pub(super) struct HalfWorkspace<T> {
+    /// Right-hand sides of each column.
+    x: Vec<[T; SIDES]>,
+    rows: Vec<[T; SIDES]>,
+    /// Supernodes on the paths of the nodes, ascending.
+    path: Vec<u32>,
+    is_on_path: Vec<bool>,
+}
+
+impl<T: Real> PackedFactor<T> {
+    /// Half solutions of the nodes at `places`, at most [`NODES`]: neighbours in the order of elimination
+    /// share most of their paths.
+    pub(super) fn half_solve(
+        &self,
+        paths: &Paths,
+        places: &[u32],
+        halves: &mut [HalfSolution],
+        work: &mut HalfWorkspace<T>,
+    ) {
+        let (columns, longest) = (self.size, self.longest);
+        work.x.resize(columns.max(work.x.len()), [T::ZERO; SIDES]);
+        work.rows.resize(longest.max(work.rows.len()), [T::ZERO; SIDES]);
+        work.is_on_path.resize(self.supernodes.len().max(work.is_on_path.len()), false);
+        work.path.clear();
+        for &place in places {
+            for s in paths.up(paths.of_node[place as usize]) {
+                if std::mem::replace(&mut work.is_on_path[s as usize], true) {
+                    break;
+                }
+                work.path.push(s);
+            }
+        }
+        work.path.sort_unstable();
+        for &s in &work.path {
+            work.is_on_path[s as usize] = false;
+            work.x[self.supernodes[s as usize].columns()].fill([T::ZERO; SIDES]);
+        }
+        for (index, &place) in places.iter().enumerate() {
+            for axis in 0..3 {
+                work.x[3 * place as usize + axis][3 * index + axis] = T::from_f64(1.0);
+            }
+        }
+        pulp::Arch::new().dispatch(HalfPass { factor: self, work, sides: 3 * places.len() });
+        for (index, (&place, half)) in places.iter().zip(halves).enumerate() {
+            let last = paths.of_node[place as usize];
+            let length = paths.parts[last as usize].1 as usize;
+            half.values.clear();
+            half.values.resize(3 * length, 0.0);
+            for s in paths.up(last) {
+                let begin = paths.parts[s as usize].0 as usize;
+                let x = &work.x[self.supernodes[s as usize].columns()];
+                for axis in 0..3 {
+                    let part = &mut half.values[axis * length + begin..];
+                    for (value, sides) in part.iter_mut().zip(x) {
+                        *value = sides[3 * index + axis].to_f64() as f32;
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// The forward pass along some paths for many right-hand sides.
+struct HalfPass<'a, T> {
+    factor: &'a PackedFactor<T>,
+    work: &'a mut HalfWorkspace<T>,
+    sides: usize,
+}
+
+impl<T: Real> pulp::WithSimd for HalfPass<'_, T> {
+    type Output = ();
+
+    #[allow(clippy::inline_always)] // as above
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let HalfPass { factor, work, sides } = self;
+        let vectors = sides.div_ceil(T::lanes::<S>());
+        let padded = vectors * T::lanes::<S>();
+        for &s in &work.path {
+            let supernode = &factor.supernodes[s as usize];
+            let row_count = supernode.row_count();
+            let mut panels = &factor.panels[supernode.panel_start as usize..];
+            let top = &work.x[supernode.columns()];
+            for first in (0..row_count).step_by(ROWS) {
+                let (panel, rest) = panels.split_at(top.len().min(first + ROWS));
+                panels = rest;
+                let top = &top[..panel.len()];
+                for row in (0..ROWS.min(row_count - first)).step_by(8) {
+                    let rows = &mut work.rows[first + row..][..8];
+                    let mut vector = 0;
+                    while vector + 3 <= vectors {
+                        product::<S, T, 4, 3>(simd, panel, top, row, vector, rows);
+                        product::<S, T, 4, 3>(simd, panel, top, row + 4, vector, &mut rows[4..]);
+                        vector += 3;
+                    }
+                    match vectors - vector {
+                        0 => {}
+                        1 => product::<S, T, 8, 1>(simd, panel, top, row, vector, rows),
+                        _ => {
+                            product::<S, T, 4, 2>(simd, panel, top, row, vector, rows);
+                            product::<S, T, 4, 2>(
+                                simd,
+                                panel,
+                                top,
+                                row + 4,
+                                vector,
+                                &mut rows[4..],
+                            );
+                        }
+                    }
+                }
+            }
+            let (rows_top, rows_below) = work.rows.split_at(supernode.columns().len());
+            work.x[supernode.columns()].copy_from_slice(rows_top);
+            for (&row, value) in factor.pattern[supernode.pattern()].iter().zip(rows_below) {
+                let x = &mut work.x[row as usize][..padded];
+                for (x, &value) in x.iter_mut().zip(value) {
+                    *x = *x - value;
+                }
+            }
+        }
+    }
+}
+
+/// `R` rows of a panel from `row` on times `G` vectors of right-hand sides from `vector` on.
+#[allow(clippy::inline_always)] // as above
+#[inline(always)]
+fn product<S: Simd, T: Real, const R: usize, const G: usize>(
+    simd: S,
+    panel: &[Panel<T>],
+    top: &[[T; SIDES]],
+    row: usize,
+    vector: usize,
+    rows: &mut [[T; SIDES]],
+) {
+    let mut sums = [[T::splat(simd, T::ZERO); G]; R];
+    for (column, sides) in panel.iter().zip(top) {
+        let sides = &T::vectors::<S>(sides)[vector..][..G];
+        for (sums, &entry) in sums.iter_mut().zip(&column[row..][..R]) {
+            let entry = T::splat(simd, entry);
+            for g in 0..G {
+                sums[g] = T::mul_add(simd, entry, sides[g], sums[g]);
+            }
+        }
+    }
+    for (row, sums) in rows.iter_mut().zip(sums) {
+        T::vectors_mut::<S>(row)[vector..][..G].copy_from_slice(&sums);
+    }
+}
