@@ -1,7 +1,7 @@
 //! Random blades in random boxes.
 
 use palpate_cutting::{Blade, CutOptions};
-use palpate_geometry::{Point, vec3};
+use palpate_geometry::{Point, TriangleFeature, point_triangle, vec3};
 use proptest::prelude::*;
 
 use crate::support::{box_mesh, checked_cut};
@@ -45,5 +45,90 @@ proptest! {
                 "{heights:?} {slack}"
             );
         }
+    }
+
+    #[test]
+    fn a_bent_stroke_leaves_nothing_across_away_from_its_border(
+        seed in 0_u64..1000,
+        start in point(-1.0, 1.0),
+        turn in 0.0..0.08,
+        depth in 0.5..7.0,
+        tilt in -0.3..0.3,
+        options in options(),
+    ) {
+        let mesh = box_mesh([5, 5, 4], 0.18, seed);
+        // A circle of at least five cells' radius, from above the box.
+        let [mut x, mut y, mut angle] = [start[0], 2.5 + start[1], -8.0 * turn];
+        let mut edges = Vec::new();
+        for _ in 0..16 {
+            edges.push([[x, y, 5.0], [x - tilt * depth * angle.sin(), y + tilt * depth, 5.0 - depth]]);
+            (x, y, angle) = (x + 0.4 * angle.cos(), y + 0.4 * angle.sin(), angle + turn);
+        }
+        let blade = Blade::stroke(&edges).unwrap();
+        let Some(cut) = checked_cut(&mesh, mesh.nodes(), &blade, &options) else {
+            return Ok(());
+        };
+        prop_assume!(blade.parts().len() == 1);
+        let slow = SlowSides::new(&blade);
+        let slack = cut.report.deviation + 1e-9;
+        for corners in cut.change.mesh.tetrahedra() {
+            let found = corners.map(|node| slow.height(cut.positions[node as usize]));
+            // Beyond the border a tetrahedron may be left whole.
+            let [Some(a), Some(b), Some(c), Some(d)] = found else { continue };
+            let heights = [a, b, c, d];
+            prop_assert!(
+                heights.iter().all(|&h| h <= slack) || heights.iter().all(|&h| h >= -slack),
+                "{heights:?} {slack}"
+            );
+        }
+    }
+}
+
+/// The obvious way to find on which side of a blade a point is.
+struct SlowSides {
+    triangles: Vec<[Point; 3]>,
+    /// For each triangle, which of its edges have no other.
+    is_border: Vec<[bool; 3]>,
+}
+
+impl SlowSides {
+    fn new(blade: &Blade) -> Self {
+        let corners: Vec<[u32; 3]> = blade.triangles().collect();
+        let has = |a: u32, b: u32| {
+            corners.iter().any(|other| (0..3).any(|k| [other[k], other[(k + 1) % 3]] == [b, a]))
+        };
+        let is_border =
+            corners.iter().map(|&[a, b, c]| [!has(a, b), !has(b, c), !has(c, a)]).collect();
+        let at = |point: u32| blade.points()[point as usize];
+        Self { triangles: corners.iter().map(|corners| corners.map(at)).collect(), is_border }
+    }
+
+    /// The distance from the closest triangle's plane, of equally close ones the furthest; `None` where the closest
+    /// point is on the border.
+    fn height(&self, point: Point) -> Option<f64> {
+        let found: Vec<_> =
+            self.triangles.iter().map(|triangle| point_triangle(point, triangle)).collect();
+        let least = found.iter().map(|found| found.distance_squared).fold(f64::INFINITY, f64::min);
+        let mut best: f64 = 0.0;
+        for (index, found) in found.iter().enumerate() {
+            if found.distance_squared > least * (1.0 + 1e-9) {
+                continue;
+            }
+            let is_border = match found.feature {
+                TriangleFeature::Face => false,
+                TriangleFeature::Edge(edge) => self.is_border[index][edge as usize],
+                TriangleFeature::Vertex(_) => true,
+            };
+            if is_border {
+                return None;
+            }
+            let [a, b, c] = self.triangles[index];
+            let normal = vec3::normalized(vec3::cross(vec3::sub(b, a), vec3::sub(c, a)))?;
+            let height = vec3::dot(vec3::sub(point, a), normal);
+            if height.abs() > best.abs() {
+                best = height;
+            }
+        }
+        Some(best)
     }
 }

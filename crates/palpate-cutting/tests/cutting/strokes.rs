@@ -111,7 +111,7 @@ fn a_loop_inside_opens_a_disc_and_keeps_its_border_joined() {
     // Nothing of the old surface was opened.
     let new = &done.change.mesh;
     let lips = new.triangles().len() - mesh.triangles().len();
-    assert!(lips > 0 && lips % 2 == 0);
+    assert!(lips > 0 && lips.is_multiple_of(2));
 }
 
 #[test]

@@ -54,7 +54,7 @@ fn cut_often(cuts: usize, cells: usize, seed: u64, options: &CutOptions) -> usiz
             [point[0] + bend, point[1], point[2] - 0.5 * bend]
         };
         (mesh, positions) = ((*done.change.mesh).clone(), done.positions);
-        positions.iter_mut().for_each(|point| *point = shift(*point));
+        positions = positions.into_iter().map(shift).collect();
         if mesh.tetrahedra().len() > limit {
             (mesh, positions) = (whole.clone(), whole.nodes().to_vec());
         }
