@@ -71,11 +71,17 @@ enum Meeting {
 
 fn meeting(corners: &[Point; 4], triangle: &[Point; 3], normal: Point) -> Meeting {
     let signs = orient3d_each(triangle, corners);
-    let [least, most] = [signs.iter().min(), signs.iter().max()];
-    if least == Some(&-1) && most == Some(&1) {
-        return if passes_inside(corners, triangle) { Meeting::Inside } else { Meeting::None };
+    let (mut least, mut most, mut on) = (0, 0, 0);
+    for sign in signs {
+        least = sign.min(least);
+        most = sign.max(most);
+        on += u8::from(sign == 0);
     }
-    if signs.iter().filter(|&&sign| sign == 0).count() < 3 {
+    if least < 0 && most > 0 {
+        let meets = !is_beside(corners, triangle, normal) && passes_inside(corners, triangle);
+        return if meets { Meeting::Inside } else { Meeting::None };
+    }
+    if on < 3 {
         return Meeting::None;
     }
     for (face, nodes) in TETRAHEDRON_FACES.iter().enumerate() {
@@ -86,6 +92,16 @@ fn meeting(corners: &[Point; 4], triangle: &[Point; 3], normal: Point) -> Meetin
         }
     }
     Meeting::None
+}
+
+/// Whether the tetrahedron lies beside the triangle, outside of one of its edges as seen along its normal: most of
+/// those near a long thin triangle do.
+fn is_beside(corners: &[Point; 4], triangle: &[Point; 3], normal: Point) -> bool {
+    (0..3).any(|side| {
+        let [from, to] = [triangle[side], triangle[(side + 1) % 3]];
+        let outward = vec3::cross(vec3::sub(to, from), normal);
+        corners.iter().all(|&corner| vec3::dot(outward, vec3::sub(corner, from)) > 0.0)
+    })
 }
 
 /// Whether a point of the triangle is strictly inside: the middle of what clipping leaves of it, tested exactly.

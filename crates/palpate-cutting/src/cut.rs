@@ -6,6 +6,7 @@ use palpate_model::{Mesh, MeshChange, MeshError};
 use crate::blade::{Blade, Sheet};
 use crate::crossing::{Crossing, Sides, crossed_edges};
 use crate::draft::Draft;
+use crate::groups::Groups;
 use crate::report::CutReport;
 use crate::separate;
 use crate::snap;
@@ -239,12 +240,27 @@ fn finish(mesh: &Mesh, draft: Draft, total: SheetCut) -> Result<Cut, CutError> {
         new_tetrahedra: new.tetrahedra().len() - old.len(),
         split_tetrahedra: was_split.iter().filter(|&&split| split).count(),
         snapped_nodes: total.snapped,
-        pieces_before: mesh.pieces().len(),
-        pieces: new.pieces().len(),
+        pieces_before: piece_count(mesh),
+        pieces: piece_count(new),
         smallest_quality: parts.min_by(f64::total_cmp),
         volume_change: new.volume() / mesh.volume() - 1.0,
         cut_area: total.area,
         deviation: total.deviation,
     };
     Ok(Cut { change, positions, report })
+}
+
+/// How many pieces without a common node there are: `mesh.pieces().len()`, without the lists.
+fn piece_count(mesh: &Mesh) -> usize {
+    let mut groups = Groups::new(mesh.nodes().len());
+    let mut is_used = vec![false; mesh.nodes().len()];
+    for &[a, b, c, d] in mesh.tetrahedra() {
+        is_used[a as usize] = true;
+        for other in [b, c, d] {
+            groups.join(a, other);
+            is_used[other as usize] = true;
+        }
+    }
+    let nodes = 0..mesh.nodes().len() as u32;
+    nodes.filter(|&node| is_used[node as usize] && groups.root(node) == node).count()
 }

@@ -9,6 +9,7 @@ mod blade;
 mod crossing;
 mod cut;
 mod draft;
+mod groups;
 mod report;
 mod separate;
 mod snap;

@@ -5,6 +5,7 @@ use palpate_model::TETRAHEDRON_FACES;
 
 use crate::crossing::Sides;
 use crate::draft::Draft;
+use crate::groups::Groups;
 
 /// What was opened.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -50,22 +51,23 @@ fn faces_to_open(
     covered: &[[u32; 3]],
     sides: &mut Sides,
 ) -> Vec<[u32; 3]> {
-    let mut faces: Vec<([u32; 3], u32)> = Vec::new();
+    let mut faces: Vec<u128> = Vec::new();
     for (tetrahedron, nodes) in draft.tetrahedra.iter().enumerate() {
         let on = nodes.map(|node| sides.is_on(node));
         if on.iter().filter(|&&on| on).count() < 3 {
             continue;
         }
         for face in TETRAHEDRON_FACES.iter().filter(|face| face.iter().all(|&k| on[k])) {
-            faces.push((sorted(face.map(|corner| nodes[corner])), tetrahedron as u32));
+            faces.push(packed(sorted(face.map(|corner| nodes[corner])), tetrahedron as u32));
         }
     }
     faces.sort_unstable();
     let mut cut = Vec::new();
-    for pair in faces.chunk_by(|left, right| left.0 == right.0) {
-        let &[(face, left), (_, right)] = pair else {
+    for same in faces.chunk_by(|left, right| left >> 32 == right >> 32) {
+        let &[left, right] = same else {
             continue;
         };
+        let (face, left, right) = (face_of(left), left as u32, right as u32);
         let is_reached = is_touched[left as usize]
             || is_touched[right as usize]
             || covered.binary_search(&face).is_ok();
@@ -93,13 +95,13 @@ fn copy_nodes(draft: &mut Draft, cut: &[[u32; 3]], is_marked: &[bool]) -> usize 
     let around: Vec<u32> = (0..draft.tetrahedra.len() as u32)
         .filter(|&tetrahedron| has_marked(&draft.tetrahedra[tetrahedron as usize]))
         .collect();
-    let mut faces: Vec<([u32; 3], u32)> = Vec::with_capacity(4 * around.len());
+    let mut faces: Vec<u128> = Vec::with_capacity(4 * around.len());
     for (place, &tetrahedron) in around.iter().enumerate() {
         let nodes = draft.tetrahedra[tetrahedron as usize];
         for face in TETRAHEDRON_FACES {
             let face = sorted(face.map(|corner| nodes[corner]));
             if has_marked(&face) && cut.binary_search(&face).is_err() {
-                faces.push((face, place as u32));
+                faces.push(packed(face, place as u32));
             }
         }
     }
@@ -112,11 +114,11 @@ fn copy_nodes(draft: &mut Draft, cut: &[[u32; 3]], is_marked: &[bool]) -> usize 
         let corner = nodes.iter().position(|&other| other == node).expect("a node of its face");
         4 * place + corner as u32
     };
-    for same in faces.chunk_by(|left, right| left.0 == right.0) {
+    for same in faces.chunk_by(|left, right| left >> 32 == right >> 32) {
         for pair in same.windows(2) {
-            for node in pair[0].0 {
+            for node in face_of(pair[0]) {
                 if is_marked[node as usize] {
-                    slots.join(slot(pair[0].1, node), slot(pair[1].1, node));
+                    slots.join(slot(pair[0] as u32, node), slot(pair[1] as u32, node));
                 }
             }
         }
@@ -153,25 +155,12 @@ fn sorted(mut face: [u32; 3]) -> [u32; 3] {
     face
 }
 
-/// Groups of numbers, joined pair by pair.
-struct Groups(Vec<u32>);
+/// A face and one of its tetrahedra in one number, which sorts fastest.
+fn packed([a, b, c]: [u32; 3], tetrahedron: u32) -> u128 {
+    u128::from(a) << 96 | u128::from(b) << 64 | u128::from(c) << 32 | u128::from(tetrahedron)
+}
 
-impl Groups {
-    fn new(count: usize) -> Self {
-        Self((0..count as u32).collect())
-    }
-
-    fn root(&mut self, mut member: u32) -> u32 {
-        while self.0[member as usize] != member {
-            self.0[member as usize] = self.0[self.0[member as usize] as usize];
-            member = self.0[member as usize];
-        }
-        member
-    }
-
-    fn join(&mut self, left: u32, right: u32) {
-        let (left, right) = (self.root(left), self.root(right));
-        // The smallest is the root, whatever the order.
-        self.0[left.max(right) as usize] = left.min(right);
-    }
+/// The face of [`packed`]; the tetrahedron is the last 32 bits.
+fn face_of(packed: u128) -> [u32; 3] {
+    [96, 64, 32].map(|shift| (packed >> shift) as u32)
 }

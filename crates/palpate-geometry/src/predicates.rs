@@ -38,7 +38,12 @@ pub fn orient3d(a: Point, b: Point, c: Point, d: Point) -> i8 {
 #[inline]
 pub fn orient3d_each<const N: usize>(triangle: &[Point; 3], points: &[Point; N]) -> [i8; N] {
     let plane = Plane::new(triangle);
-    points.map(|point| plane.side(point))
+    let mut sides = [0; N];
+    // PERF: `map` on arrays is not unrolled.
+    for (side, &point) in sides.iter_mut().zip(points) {
+        *side = plane.side(point);
+    }
+    sides
 }
 
 /// The sign of the area of the triangle (`a`, `b`, `c`): +1 counter-clockwise, 0 exactly

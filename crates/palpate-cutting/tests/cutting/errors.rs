@@ -123,7 +123,8 @@ fn files_of_strokes() {
     let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/cutting.md");
     let page = std::fs::read_to_string(page).unwrap();
     let example = page.split("```blade\n").nth(1).and_then(|rest| rest.split("```").next());
-    let whens = parse_strokes(example.unwrap(), "manual").unwrap().into_iter().map(|stroke| stroke.when);
+    let whens =
+        parse_strokes(example.unwrap(), "manual").unwrap().into_iter().map(|stroke| stroke.when);
     assert_eq!(whens.collect::<Vec<_>>(), [When::Time(0.2), When::Step(30), When::Time(0.5)]);
 
     let cases = [

@@ -170,11 +170,6 @@ pub(super) fn check_duplicates(data: &MeshData) -> Result<(), MeshError> {
 
 /// Elements with the same nodes as an earlier one, in rising order.
 fn duplicates<const N: usize>(elements: &[[u32; N]], node_count: usize) -> Vec<u32> {
-    let sorted = |element: u32| {
-        let mut key = elements[element as usize];
-        key.sort_unstable();
-        key
-    };
     let mut offsets = vec![0_u32; node_count + 1];
     let smallest = |element: &[u32; N]| element.iter().copied().min().unwrap_or(0) as usize;
     for element in elements {
@@ -191,11 +186,17 @@ fn duplicates<const N: usize>(elements: &[[u32; N]], node_count: usize) -> Vec<u
         *slot += 1;
     }
     let mut repeated = Vec::new();
+    let mut keyed: Vec<([u32; N], u32)> = Vec::new();
     for range in offsets.windows(2) {
-        let bucket = &mut buckets[range[0] as usize..range[1] as usize];
-        bucket.sort_unstable_by_key(|&element| (sorted(element), element));
-        for run in bucket.chunk_by(|&left, &right| sorted(left) == sorted(right)) {
-            repeated.extend_from_slice(&run[1..]);
+        keyed.clear();
+        keyed.extend(buckets[range[0] as usize..range[1] as usize].iter().map(|&element| {
+            let mut key = elements[element as usize];
+            key.sort_unstable();
+            (key, element)
+        }));
+        keyed.sort_unstable();
+        for run in keyed.chunk_by(|left, right| left.0 == right.0) {
+            repeated.extend(run[1..].iter().map(|&(_, element)| element));
         }
     }
     repeated.sort_unstable();
