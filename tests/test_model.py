@@ -22,6 +22,8 @@ BRANCH{
 }
 """
 
+LIFT = np.array([0.0, 0.0, 5.0])
+
 
 @pytest.fixture
 def write_model(tmp_path, cube):
@@ -194,3 +196,40 @@ def test_materials_of_regions_and_fibres(tmp_path, cube):
     read = palpate.read_model(tmp_path / "case.bml").bodies[0]
     assert read.regions == {1: palpate.Material(law="hgo", k1=3000.0)}
     assert read.mesh == mesh
+
+
+def test_attachments_tie_bodies() -> None:
+    box = palpate.read_model("small").bodies[0].mesh
+    low, high = box.nodes.min(axis=0), box.nodes.max(axis=0)
+    lift = np.array([0, 0, high[2] - low[2] + 1e-4])
+    above = palpate.Mesh(box.nodes + lift, box.tetrahedra)
+    bodies = [palpate.Body(box, name="low"), palpate.Body(above, name="up")]
+    ties = [palpate.Attachment("up", "low", within=2e-3, stiffness=1e6)]
+    model = palpate.Model(bodies, attachments=ties)
+    (found,) = model.attachments
+    assert (found.first, found.second, found.stiffness) == ("up", "low", 1e6)
+    assert found.nodes is not None
+    assert len(found.nodes) > 0
+    assert (above.nodes[found.nodes][:, 2] < low[2] + lift[2] + 2e-3).all()
+    palpate.Simulation(model).step(2)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error", "message"),
+    [
+        (("up", "low", 1e-9), ValueError, r"attachments\[0\]: no node of `up` is within 1e-9 m"),
+        (("up", "up"), ValueError, "a body cannot be attached to itself"),
+        (("up", "liver"), ValueError, "no body is named 'liver'"),
+        (("up", "low", -1.0), ValueError, "within must be greater than 0, found -1"),
+        (("up", "low", np.nan), ValueError, r"attachments\[0\]: within: expected a finite number"),
+        (("up", 7), IndexError, "index 7 is out of range"),
+    ],
+)
+def test_bad_attachments(arguments: tuple, error: type[Exception], message: str) -> None:
+    box = palpate.read_model("small").bodies[0].mesh
+    far = palpate.Mesh(box.nodes + LIFT, box.tetrahedra)
+    bodies = [palpate.Body(box, name="low"), palpate.Body(far, name="up")]
+    with pytest.raises(error, match=message):
+        palpate.Model(bodies, attachments=[palpate.Attachment(*arguments)])
+    with pytest.raises(TypeError, match=r"attachments\[0\]: expected a palpate.Attachment"):
+        palpate.Model(bodies, attachments=[("up", "low")])  # type: ignore[list-item]

@@ -21,11 +21,21 @@ from palpate.files import read_mesh, write_mesh
 from palpate.hands import Pull, Tool
 from palpate.mesh import Defect, Mesh
 from palpate.meshing import label_surface, mesh_image, mesh_surface
-from palpate.model import Body, Contact, Material, Model, RigidKey, TreeElement, read_model
+from palpate.model import (
+    Attachment,
+    Body,
+    Contact,
+    Material,
+    Model,
+    RigidKey,
+    TreeElement,
+    read_model,
+)
 from palpate.scene import Scene
 from palpate.simulation import Contacts, Simulation, Snapshot, StepReport
 
 __all__ = [
+    "Attachment",
     "Body",
     "CheckpointError",
     "ClosestPoints",

@@ -130,11 +130,18 @@ class Body:
 
 @final
 class Model:
-    def __new__(cls, bodies: Sequence[Body], gravity: _Vec3) -> Model: ...
+    def __new__(
+        cls,
+        bodies: Sequence[Body],
+        gravity: _Vec3,
+        attachments: Sequence[tuple[int, int, float | None, float | None]],
+    ) -> Model: ...
     @property
     def bodies(self) -> list[Body]: ...
     @property
     def gravity(self) -> _Vec3: ...
+    @property
+    def attachments(self) -> list[tuple[int, int, float | None, _Index]]: ...
     @property
     def notes(self) -> list[str]: ...
     @property

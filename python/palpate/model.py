@@ -154,6 +154,23 @@ class Body:
         return f"Body({self.name!r}, {kind}, {self.mesh!r})"
 
 
+@dataclass(frozen=True, eq=False)
+class Attachment:
+    """Two bodies tied together where they touch in the model, as by a ligament.
+
+    The surface nodes of ``first`` within ``within`` [m] of the surface of ``second`` are tied to
+    it (default: half the mean surface edge of ``first``) with ``stiffness`` [Pa/m] (default: that
+    of contact between the two). Bodies are given by index or name. When ``first`` is rigid the two
+    change places. ``nodes`` (m,) are the tied nodes of a model's attachment.
+    """
+
+    first: int | str
+    second: int | str
+    within: float | None = None
+    stiffness: float | None = None
+    nodes: npt.NDArray[np.int32] | None = None
+
+
 @dataclass(frozen=True)
 class TreeElement:
     """An element of the upper binary tree: ``CE`` joins two subtrees, ``NE`` is a body."""
@@ -178,6 +195,8 @@ class Model:
         At least one. Names are made unique with ``_2``, ``_3``.
     gravity : three numbers
         [m/s²]
+    attachments : iterable of Attachment
+        Bodies that are tied together.
     """
 
     __slots__ = ("__dict__", "_core")
@@ -187,6 +206,7 @@ class Model:
         bodies: Iterable[Body | Mesh],
         *,
         gravity: Sequence[float] = (0.0, 0.0, -9.81),
+        attachments: Iterable[Attachment] = (),
     ) -> None:
         items = [bodies] if isinstance(bodies, (Body, Mesh)) else list(bodies)
         cores = []
@@ -199,7 +219,21 @@ class Model:
                     f"got {type(item).__name__}"
                 )
             cores.append(item._to_core())
-        self._core = _core.Model(cores, _arrays.vector(gravity, "gravity"))
+        names = [core.name for core in _core.Model(cores, (0.0, 0.0, 0.0), []).bodies]
+        ties = []
+        for index, each in enumerate(attachments):
+            if not isinstance(each, Attachment):
+                raise TypeError(
+                    f"attachments[{index}]: expected a palpate.Attachment, "
+                    f"got {type(each).__name__}"
+                )
+            reach, stiffness = (
+                None if value is None else _arrays.scalar(value, f"attachments[{index}]: {name}")
+                for name, value in (("within", each.within), ("stiffness", each.stiffness))
+            )
+            pair = (body_index(names, each.first), body_index(names, each.second))
+            ties.append((*pair, reach, stiffness))
+        self._core = _core.Model(cores, _arrays.vector(gravity, "gravity"), ties)
 
     @classmethod
     def _from_core(cls, core: _core.Model) -> Model:
@@ -221,6 +255,15 @@ class Model:
     def tree(self) -> TreeElement:
         """The upper binary tree (CE and NE) that the text's BRANCH and TREE blocks make."""
         return TreeElement._from_core(self._core.structure)
+
+    @property
+    def attachments(self) -> tuple[Attachment, ...]:
+        """Bodies that are tied together, with the tied nodes."""
+        names = [body.name for body in self.bodies]
+        return tuple(
+            Attachment(names[first], names[second], stiffness=stiffness, nodes=nodes)
+            for first, second, stiffness, nodes in self._core.attachments
+        )
 
     @property
     def notes(self) -> tuple[str, ...]:

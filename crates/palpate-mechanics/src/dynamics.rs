@@ -160,15 +160,24 @@ impl Dynamics {
                     .map_err(|error| MechanicsError::Threads(error.to_string()))?,
             ),
         };
+        let surfaces: Vec<Surface> =
+            model.bodies.iter().map(|body| Surface::new(&body.mesh)).collect();
+        let mut ties = Ties::default();
+        for attachment in &model.attachments {
+            let [a, b] = attachment.bodies;
+            let pressure =
+                attachment.stiffness.unwrap_or_else(|| parameters[a].stiffness(&parameters[b]));
+            ties.attach(attachment, |node| pressure * surfaces[a].node_area(node));
+        }
         Ok(Self {
             options,
             pool,
             tasks,
             places,
-            surfaces: model.bodies.iter().map(|body| Surface::new(&body.mesh)).collect(),
+            response: Response::new(ties.attached_nodes()),
+            surfaces,
             parameters,
-            response: Response::default(),
-            ties: Ties::default(),
+            ties,
             start_time: 0.0,
             start_step: 0,
             step: 0,

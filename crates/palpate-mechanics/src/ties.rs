@@ -1,8 +1,10 @@
-//! Springs that pull nodes to a place: what a mouse or a haptic device holds tissue with.
+//! What ties nodes: springs to a place in space, which a mouse or a haptic device pulls with, and
+//! attachments to other bodies.
 
 use glam::DVec3;
 use palpate_contact::PairKind;
 use palpate_geometry::Point;
+use palpate_model::{AttachedNode, Attachment, triangle_axes};
 
 use crate::contact::filter::Candidate;
 
@@ -25,14 +27,33 @@ pub struct Pull {
     pub moved: f64,
 }
 
-/// All springs of a simulation, in the order in which they were made.
+/// A node of one body that is tied to the surface of another.
+#[derive(Clone, Copy, Debug)]
+struct TiedNode {
+    bodies: [u32; 2],
+    place: AttachedNode,
+    stiffness: f64,
+}
+
+/// All springs of a simulation, in the order in which they were made, and then the attachments of its
+/// model.
 #[derive(Debug, Default)]
 pub(crate) struct Ties {
     pulls: Vec<Pull>,
     next_id: u64,
+    attached: Vec<TiedNode>,
 }
 
 impl Ties {
+    /// Ties what `attachment` names; `stiffness` gives that of a node of the first body [N/m].
+    pub(crate) fn attach(&mut self, attachment: &Attachment, stiffness: impl Fn(u32) -> f64) {
+        let bodies = attachment.bodies.map(|body| body as u32);
+        self.attached.extend(attachment.ties.iter().map(|&place| {
+            let stiffness = stiffness(place.node);
+            TiedNode { bodies, place, stiffness }
+        }));
+    }
+
     pub(crate) fn pulls(&self) -> &[Pull] {
         &self.pulls
     }
@@ -83,7 +104,7 @@ impl Ties {
         pulls.map(|pull| pull.moved).fold(0.0, f64::max)
     }
 
-    /// Adds the springs to the candidates of a step; `place` gives the position of a node and the
+    /// Adds all ties to the candidates of a step, the springs first; `place` gives the position of a node and the
     /// contact distance of its body.
     pub(crate) fn add_candidates(
         &self,
@@ -94,27 +115,62 @@ impl Ties {
             let (position, distance) = place(pull.body, pull.node);
             let offset = DVec3::from_array(position) - DVec3::from_array(pull.target);
             Candidate {
-                kind: PairKind::VertexTriangle,
                 bodies: [pull.body; 2],
                 nodes: [pull.node; 4],
                 weights: [1.0, 0.0, 0.0, 0.0],
-                normal: offset.try_normalize().unwrap_or(DVec3::X),
-                gap: 0.0,
-                distance,
                 stiffness: pull.stiffness,
-                recovery: 0.0,
-                friction: 0.0,
-                tied: Some(offset),
+                ..tie(offset, distance)
+            }
+        }));
+        candidates.extend(self.attached.iter().map(|tied| {
+            let AttachedNode { node, corners, weights, offset } = tied.place;
+            let (position, distance) = place(tied.bodies[0], node);
+            let at = corners.map(|corner| DVec3::from_array(place(tied.bodies[1], corner).0));
+            let foot: DVec3 = at.iter().zip(weights).map(|(&x, w)| w * x).sum();
+            let goal = foot + triangle_axes(at) * DVec3::from_array(offset);
+            let offset = DVec3::from_array(position) - goal;
+            let [wa, wb, wc] = weights;
+            Candidate {
+                bodies: tied.bodies,
+                nodes: [node, corners[0], corners[1], corners[2]],
+                weights: [1.0, -wa, -wb, -wc],
+                stiffness: tied.stiffness,
+                ..tie(offset, distance)
             }
         }));
     }
 
-    /// Keeps the forces of the step that ends, one per spring [N].
+    /// (body, node, other body) of everything that is attached, sorted.
+    pub(crate) fn attached_nodes(&self) -> Vec<(u32, u32, u32)> {
+        let key = |tied: &TiedNode| (tied.bodies[0], tied.place.node, tied.bodies[1]);
+        let mut keys: Vec<_> = self.attached.iter().map(key).collect();
+        keys.sort_unstable();
+        keys
+    }
+
+    /// Keeps the forces of the step that ends: those of the springs come first [N].
     pub(crate) fn finish(&mut self, forces: impl Iterator<Item = DVec3>) {
         for (pull, force) in self.pulls.iter_mut().zip(forces) {
             pull.force = force.to_array();
             pull.moved = 0.0;
         }
+    }
+}
+
+/// A tie that nothing is known of but its offset [m].
+fn tie(offset: DVec3, distance: f64) -> Candidate {
+    Candidate {
+        kind: PairKind::VertexTriangle,
+        bodies: [0; 2],
+        nodes: [0; 4],
+        weights: [0.0; 4],
+        normal: offset.try_normalize().unwrap_or(DVec3::X),
+        gap: 0.0,
+        distance,
+        stiffness: 0.0,
+        recovery: 0.0,
+        friction: 0.0,
+        tied: Some(offset),
     }
 }
 

@@ -1,5 +1,6 @@
 //! The model: bodies placed in space, how the text joins them, and what acts on all of them.
 
+mod attachment;
 mod material;
 mod pose;
 mod validate;
@@ -14,6 +15,7 @@ use serde::{Deserialize, Serialize};
 use crate::language::Document;
 use crate::mesh::Mesh;
 
+pub use attachment::{AttachedNode, Attachment, AttachmentError, triangle_axes};
 pub use material::{Law, Material};
 pub use pose::{Pose, PoseParts};
 pub use validate::BodyError;
@@ -25,6 +27,8 @@ pub struct Model {
     pub bodies: Vec<Body>,
     /// How BRANCH blocks join the bodies: the upper part of the paper's binary tree (CE and NE).
     pub structure: Structure,
+    /// Bodies that are tied to each other.
+    pub attachments: Vec<Attachment>,
     /// Acceleration of gravity [m/s²].
     pub gravity: Point,
     /// What the readers of the mesh files had to say, one sentence each.
@@ -44,6 +48,7 @@ impl Model {
         Self {
             structure: structure.expect("a model has at least one body"),
             bodies,
+            attachments: Vec::new(),
             gravity: Document::GRAVITY,
             notes: Vec::new(),
             document: None,

@@ -14,7 +14,8 @@ mod text;
 
 pub use diagnostic::{Diagnostic, ModelError, Span};
 pub use document::{
-    AppearanceEntries, Block, Branch, ContactEntries, Document, Fixed, FixedRegion,
-    MaterialEntries, PathKey, RegionEntries, Rotation, Settings, Transform, Tree, Unit,
+    AppearanceEntries, AttachmentEntries, Block, Branch, ContactEntries, Document, Fixed,
+    FixedRegion, MaterialEntries, PathKey, RegionEntries, Rotation, Settings, Transform, Tree,
+    Unit,
 };
 pub use load::{CoreLoader, LoadError, MeshLoader, load_model};

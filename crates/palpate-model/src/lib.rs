@@ -7,8 +7,8 @@ pub mod mesh;
 mod number;
 
 pub use body::{
-    Appearance, Body, BodyError, ContactSettings, Law, Material, Model, Pose, PoseParts, RigidKey,
-    RigidMotion, Structure,
+    Appearance, AttachedNode, Attachment, AttachmentError, Body, BodyError, ContactSettings, Law,
+    Material, Model, Pose, PoseParts, RigidKey, RigidMotion, Structure, triangle_axes,
 };
 pub use files::{FileError, FileErrorCause, ReadMesh, ReadOptions, read_mesh, write_mesh};
 pub use language::{

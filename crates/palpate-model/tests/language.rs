@@ -4,8 +4,8 @@ use std::path::Path;
 
 use insta::assert_snapshot;
 use palpate_model::language::{
-    AppearanceEntries, Block, Branch, ContactEntries, Fixed, FixedRegion, MaterialEntries, PathKey,
-    RegionEntries, Rotation, Settings, Span, Transform, Tree, Unit,
+    AppearanceEntries, AttachmentEntries, Block, Branch, ContactEntries, Fixed, FixedRegion,
+    MaterialEntries, PathKey, RegionEntries, Rotation, Settings, Span, Transform, Tree, Unit,
 };
 use palpate_model::{Document, Law};
 use proptest::prelude::*;
@@ -511,8 +511,18 @@ fn tree() -> impl Strategy<Value = Block> {
 
 fn document() -> impl Strategy<Value = Document> {
     let block = tree().prop_recursive(4, 12, 3, |inner| {
-        (settings(), prop::collection::vec(inner, 1..4))
-            .prop_map(|(settings, children)| Block::Branch(Box::new(Branch { settings, children })))
+        let attachment =
+            ([name(), name()], prop::option::of(positive()), prop::option::of(positive()))
+                .prop_map(|(bodies, within, stiffness)| AttachmentEntries {
+                    bodies,
+                    within,
+                    stiffness,
+                    span: Span::default(),
+                });
+        (settings(), prop::collection::vec(inner, 1..4), prop::collection::vec(attachment, 0..3))
+            .prop_map(|(settings, children, attachments)| {
+                Block::Branch(Box::new(Branch { settings, children, attachments }))
+            })
     });
     let unit = prop::sample::select(vec!["m", "dm", "cm", "mm", "um"]);
     (block, unit, triple(), prop::option::of(name())).prop_map(|(root, unit, gravity, name)| {
@@ -540,6 +550,9 @@ fn soup() -> impl Strategy<Value = String> {
         "CN",
         "VE",
         "IV",
+        "AT",
+        "join",
+        "within",
         "{",
         "}",
         "(",
@@ -629,4 +642,36 @@ proptest! {
             }
         }
     }
+}
+
+#[test]
+fn attachments_are_read_and_written() {
+    let text = "\
+BRANCH{
+  TREE kidney{
+    NE kidney.seg
+  }
+  TREE \"the aorta\"{
+    NE aorta.seg
+  }
+  AT{ join kidney \"the aorta\"  within 2  stiffness 100000 }
+  AT{ join kidney \"within\" }
+}
+";
+    assert_eq!(parse(text).to_text(), text);
+    let bare = text.replace("AT{ join kidney \"within\" }", "AT join kidney \"within\"");
+    assert_eq!(parse(&bare), parse(text));
+    let wrong = "BRANCH{ TREE a{ NE a.seg AT{ join a b } }
+AT{ within 2 } AT{ join a } AT{ join a within 3 } AT{ join a b within 0 } AT{ joyn a b }
+AT{ join a b stiffness -1 } join a b }";
+    assert_snapshot!(brief(wrong), @r"
+    1:26: AT does not stand in a TREE
+    2:1: this AT joins nothing (write join and the names of two bodies: AT{ join kidney aorta })
+    2:20: join takes the names of two bodies, found `}`
+    2:33: join takes the names of two bodies, found `within`
+    2:71: within must be greater than 0, found 0
+    2:79: unknown word `joyn` (joyn: did you mean join?)
+    3:24: stiffness must be greater than 0, found -1
+    3:29: `join` belongs into AT (write AT{ join ... })
+    ");
 }

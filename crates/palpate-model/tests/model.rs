@@ -365,3 +365,51 @@ fn an_open_surface_is_a_body_too() {
     assert_eq!(model.bodies[0].mesh.triangles(), [[0, 2, 1]]);
     assert_eq!(model.bodies[1].rigid, None);
 }
+
+#[test]
+fn attachments_tie_the_nodes_within_reach() {
+    let text = |attachments: &str| {
+        format!(
+            "unit mm BRANCH{{ TREE low{{ NE a.seg }} TREE{{ ME{{ trans 0,0,2.125 scale 1,1,2 }} NE b.seg }}
+TREE table{{ ME{{ trans 0,0,-2 }} NE a.seg RG fixed }} TREE far{{ ME{{ trans 40,0,0 }} NE a.seg RG fixed }}
+{attachments} }}"
+        )
+    };
+    let model = load(&text("AT{ join b low }  AT{ join table low  within 0.01  stiffness 2e5 }"));
+    let [above, below] = &model.attachments[..] else { panic!("{:?}", model.attachments) };
+    assert_eq!((above.bodies, above.stiffness), ([1, 0], None));
+    let nodes: Vec<u32> = above.ties.iter().map(|tie| tie.node).collect();
+    assert_eq!(nodes, (0..9).collect::<Vec<_>>(), "the lower face of the upper box");
+    for tie in &above.ties {
+        let corner = |k: usize| DVec3::from(model.bodies[0].mesh.nodes()[tie.corners[k] as usize]);
+        let corners = [corner(0), corner(1), corner(2)];
+        let axes = palpate_model::triangle_axes(corners);
+        let place: DVec3 = (0..3).map(|k| tie.weights[k] * corners[k]).sum();
+        let node = place + axes * DVec3::from(tie.offset);
+        assert!(close(node.to_array(), model.bodies[1].mesh.nodes()[tie.node as usize]));
+        assert!((DVec3::from(tie.offset).length() - 0.125e-3).abs() < 1e-12, "{:?}", tie.offset);
+    }
+    // A rigid body's nodes cannot be pulled: those of the other one are tied.
+    assert_eq!((below.bodies, below.stiffness, below.ties.len()), ([0, 2], Some(2e5), 9));
+    let again = Document::parse(&model.to_text().unwrap(), Path::new("")).unwrap();
+    assert_eq!(again, model.document.unwrap());
+
+    let wrong =
+        "AT{ join b lo }  AT{ join b far within 3 }  AT{ join low low }  AT{ join table far }";
+    assert_snapshot!(load_errors(&text(wrong)), @r"
+    3:1: no body is named `lo` (lo: did you mean low?)
+    3:18: no node of `b` is within 0.003 m of `far`; the nearest is 0.038 m away (place the bodies closer, or say within how far)
+    3:45: a body cannot be attached to itself
+    3:65: `far` and `table` are both rigid: there is nothing to attach
+    ");
+}
+
+#[test]
+fn held_nodes_need_no_tie() {
+    let model = load(
+        "BRANCH{ TREE low{ NE a.seg }
+TREE up{ ME{ trans 0,0,2 } NE a.seg FX{ box 0,0,0 2,0,0 } } AT{ join up low } }",
+    );
+    let nodes: Vec<u32> = model.attachments[0].ties.iter().map(|tie| tie.node).collect();
+    assert_eq!(nodes, (3..9).collect::<Vec<_>>());
+}

@@ -8,8 +8,8 @@ use glam::{DQuat, DVec3};
 use numpy::{PyArray1, PyReadonlyArray1};
 use palpate::Model;
 use palpate::model::{
-    Appearance, Body, BodyError, ContactSettings, Document, LoadError, Material, MeshLoader,
-    ReadMesh, RigidKey, RigidMotion, Structure, load_model as load,
+    Appearance, Attachment, Body, BodyError, ContactSettings, Document, LoadError, Material,
+    MeshLoader, ReadMesh, RigidKey, RigidMotion, Structure, load_model as load,
 };
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -25,6 +25,8 @@ type MaterialRow =
     (String, f64, f64, f64, f64, f64, f64, f64, f64, f64, Option<Vec3>, Option<Vec3>);
 type ContactRow = (f64, Option<f64>, Option<f64>, bool);
 type KeyRow = (f64, Vec3, Quaternion);
+type AttachmentRow = (usize, usize, Option<f64>, Option<f64>);
+type AttachedRow<'py> = (usize, usize, Option<f64>, Bound<'py, PyArray1<i32>>);
 
 /// A body of a model.
 #[pyclass(frozen, name = "Body", module = "palpate._core")]
@@ -215,13 +217,22 @@ pub(crate) struct PyModel {
 #[pymethods]
 impl PyModel {
     #[new]
-    fn new(bodies: Vec<PyRef<'_, PyBody>>, gravity: Vec3) -> PyResult<Self> {
+    fn new(
+        bodies: Vec<PyRef<'_, PyBody>>,
+        gravity: Vec3,
+        attachments: Vec<AttachmentRow>,
+    ) -> PyResult<Self> {
         if bodies.is_empty() {
             return Err(PyValueError::new_err("bodies: expected at least one body, got none"));
         }
         let bodies = bodies.iter().map(|body| body.body.clone()).collect();
         let mut model = Model::from_bodies(bodies);
         model.gravity = gravity.into();
+        for (row, (first, second, within, stiffness)) in attachments.into_iter().enumerate() {
+            let found = Attachment::find(&model.bodies, [first, second], within, stiffness);
+            let label = |error| PyValueError::new_err(format!("attachments[{row}]: {error}"));
+            model.attachments.push(found.map_err(label)?);
+        }
         Ok(Self { model: Arc::new(model) })
     }
 
@@ -233,6 +244,17 @@ impl PyModel {
     #[getter]
     fn gravity(&self) -> Vec3 {
         self.model.gravity.into()
+    }
+
+    /// Bodies, stiffness and tied nodes of each attachment.
+    #[getter]
+    fn attachments<'py>(&self, py: Python<'py>) -> Vec<AttachedRow<'py>> {
+        let row = |attachment: &Attachment| {
+            let nodes: Vec<u32> = attachment.ties.iter().map(|tie| tie.node).collect();
+            let [first, second] = attachment.bodies;
+            (first, second, attachment.stiffness, index_vector(py, &nodes))
+        };
+        self.model.attachments.iter().map(row).collect()
     }
 
     #[getter]

@@ -74,11 +74,18 @@ impl BodyView<'_> {
 pub(crate) struct Filter {
     /// (body, node, other body) of the nodes that are inside another body, sorted.
     inside: Vec<(u32, u32, u32)>,
+    /// (body, node, other body) of the nodes that are attached to another body, sorted: they do not
+    /// push it.
+    attached: Vec<(u32, u32, u32)>,
     /// (body, node, other body, candidate) of the nodes against triangles, sorted.
     by_node: Vec<(u32, u32, u32, u32)>,
 }
 
 impl Filter {
+    pub(crate) fn new(attached: Vec<(u32, u32, u32)>) -> Self {
+        Self { attached, ..Self::default() }
+    }
+
     /// Adds the contact candidates of this step, in the order of the pairs, then of the penetrations.
     pub(crate) fn run<'a>(
         &mut self,
@@ -94,6 +101,9 @@ impl Filter {
         for pair in proximity {
             let bodies = pair.bodies.map(&view);
             if bodies[0].parameters.rigid && bodies[1].parameters.rigid {
+                continue;
+            }
+            if self.is_attached(pair) {
                 continue;
             }
             let gap = match pair.kind {
@@ -128,10 +138,26 @@ impl Filter {
                 normal: node.direction,
                 distance: node.depth,
             };
+            if self.is_attached(&pair) {
+                continue;
+            }
             let area = bodies[0].surface.node_area(node.node);
             let normal = DVec3::from_array(node.direction);
             candidates.push(candidate(&pair, -node.depth, normal, area, bodies, time_step));
         }
+    }
+
+    /// Whether all nodes of one side of a pair are attached to the body of the other.
+    fn is_attached(&self, pair: &ProximityPair) -> bool {
+        if self.attached.is_empty() || pair.bodies[0] == pair.bodies[1] {
+            return false;
+        }
+        (0..2).any(|own| {
+            (0..4).filter(|&corner| side(pair.kind, corner) == own).all(|corner| {
+                let key = (pair.bodies[own], pair.nodes[corner], pair.bodies[1 - own]);
+                self.attached.binary_search(&key).is_ok()
+            })
+        })
     }
 
     /// Keeps one of several contacts of a node with a body in the same direction: straight above an

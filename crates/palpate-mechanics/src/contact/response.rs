@@ -36,6 +36,11 @@ pub(crate) struct Response {
 }
 
 impl Response {
+    /// With nodes (body, node, other body) that do not push the body that they are attached to.
+    pub(crate) fn new(attached: Vec<(u32, u32, u32)>) -> Self {
+        Self { filter: Filter::new(attached), ..Self::default() }
+    }
+
     /// Begins a step with the ties that `add` writes.
     pub(crate) fn begin(&mut self, add: impl FnOnce(&mut Vec<Candidate>)) {
         self.candidates.clear();

@@ -1,5 +1,6 @@
 //! Physics that the mechanics must get right, body by body and in contact.
 
+mod attachment;
 mod contact;
 mod determinism;
 mod elasticity;

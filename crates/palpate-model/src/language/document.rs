@@ -90,6 +90,21 @@ pub struct Branch {
     pub settings: Settings,
     /// The blocks in it; at least one.
     pub children: Vec<Block>,
+    /// AT, in the order of the text.
+    pub attachments: Vec<AttachmentEntries>,
+}
+
+/// An AT element: two bodies that are tied together.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct AttachmentEntries {
+    /// `join`: names of the bodies, anywhere in the model.
+    pub bodies: [String; 2],
+    /// `within` [unit].
+    pub within: Option<f64>,
+    /// `stiffness` [Pa/m].
+    pub stiffness: Option<f64>,
+    /// Where AT stands.
+    pub span: Span,
 }
 
 /// A TREE block.

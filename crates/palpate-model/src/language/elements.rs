@@ -2,8 +2,8 @@
 
 use super::diagnostic::Span;
 use super::document::{
-    AppearanceEntries, ContactEntries, Fixed, FixedRegion, MaterialEntries, PathKey, RegionEntries,
-    Rotation, Transform,
+    AppearanceEntries, AttachmentEntries, ContactEntries, Fixed, FixedRegion, MaterialEntries,
+    PathKey, RegionEntries, Rotation, Transform,
 };
 use super::lexer::Token;
 use super::near::near_miss;
@@ -400,6 +400,44 @@ impl Parser<'_> {
             }
         });
         contact
+    }
+
+    /// An AT; `None` when it does not name two bodies.
+    pub(super) fn attachment(&mut self, span: Span) -> Option<AttachmentEntries> {
+        let mut attachment = AttachmentEntries { span, ..AttachmentEntries::default() };
+        let mut bodies = None;
+        let errors_before = self.errors_so_far();
+        let allowed = ["join", "within", "stiffness"];
+        self.entries("AT", span, &allowed, NONE_AGAIN, |parser, keyword, span| match keyword {
+            "join" => bodies = parser.two_names(span),
+            "within" => attachment.within = parser.positive("within", span),
+            _ => attachment.stiffness = parser.positive("stiffness", span),
+        });
+        if bodies.is_none() && self.errors_so_far() == errors_before {
+            let hint = "write join and the names of two bodies: AT{ join kidney aorta }";
+            self.error_with_hint(span, "this AT joins nothing", hint);
+        }
+        attachment.bodies = bodies?;
+        Some(attachment)
+    }
+
+    /// The names of two bodies.
+    fn two_names(&mut self, span: Span) -> Option<[String; 2]> {
+        let mut names = Vec::new();
+        while names.len() < 2 {
+            let name = match self.peek().0 {
+                Token::Word(word) if !is_keyword(word) && !is_entry(word) => word.clone(),
+                Token::Quoted(text) => text.clone(),
+                _ => {
+                    let found = self.found();
+                    self.error(span, format!("join takes the names of two bodies, found {found}"));
+                    return None;
+                }
+            };
+            names.push(name);
+            self.advance();
+        }
+        names.try_into().ok()
     }
 
     pub(super) fn appearance(&mut self, span: Span) -> AppearanceEntries {

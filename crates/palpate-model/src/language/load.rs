@@ -9,11 +9,14 @@ use glam::{DMat3, DVec3};
 
 use super::diagnostic::{Diagnostic, ModelError, Span};
 use super::document::{
-    AppearanceEntries, Block, ContactEntries, Document, Fixed, FixedRegion, MaterialEntries,
-    PathKey, RegionEntries, Settings, Tree,
+    AppearanceEntries, AttachmentEntries, Block, ContactEntries, Document, Fixed, FixedRegion,
+    MaterialEntries, PathKey, RegionEntries, Settings, Tree,
 };
 use super::near::near_miss;
-use crate::body::{Body, BodyError, Material, Model, Pose, RigidKey, RigidMotion, Structure};
+use crate::body::{
+    Attachment, AttachmentError, Body, BodyError, Material, Model, Pose, RigidKey, RigidMotion,
+    Structure,
+};
 use crate::files::{FileError, ReadMesh, ReadOptions, read_mesh};
 use crate::mesh::{Mesh, MeshError};
 use crate::number::Triple;
@@ -99,11 +102,15 @@ impl Document {
             errors: Vec::new(),
         };
         let structure = build.block(&self.root, &Inherited::default());
+        // Where a mesh is wrong bodies are missing, and that error is enough.
+        let attachments =
+            if build.errors.is_empty() { build.attachments(&self.root) } else { Vec::new() };
         let Build { bodies, notes, errors, .. } = build;
         match structure {
             Some(structure) if errors.is_empty() => Ok(Model {
                 bodies,
                 structure,
+                attachments,
                 gravity: self.gravity,
                 notes,
                 document: Some(self.clone()),
@@ -254,6 +261,46 @@ impl Build<'_> {
             (block.region, entries.material(placement))
         });
         (self.errors.len() == errors_before).then(|| regions.collect())
+    }
+
+    /// Every AT below `block`, once all bodies are known.
+    fn attachments(&mut self, block: &Block) -> Vec<Attachment> {
+        let Block::Branch(branch) = block else { return Vec::new() };
+        let mut found = Vec::new();
+        for child in &branch.children {
+            found.extend(self.attachments(child));
+        }
+        for entries in &branch.attachments {
+            found.extend(self.attachment(entries));
+        }
+        found
+    }
+
+    fn attachment(&mut self, entries: &AttachmentEntries) -> Option<Attachment> {
+        let mut bodies = [0; 2];
+        for (index, name) in bodies.iter_mut().zip(&entries.bodies) {
+            let names: Vec<&str> = self.bodies.iter().map(|body| body.name.as_str()).collect();
+            if let Some(place) = names.iter().position(|known| known == name) {
+                *index = place;
+                continue;
+            }
+            let hint = match near_miss(name, &names) {
+                Some(meant) => format!("{name}: did you mean {meant}?"),
+                None => format!("the model has {}", names.join(", ")),
+            };
+            self.error(entries.span, format!("no body is named `{name}`"), Some(hint));
+            return None;
+        }
+        let within = entries.within.map(|within| within * self.document.unit.metres());
+        match Attachment::find(&self.bodies, bodies, within, entries.stiffness) {
+            Ok(attachment) => Some(attachment),
+            Err(error) => {
+                let hint = matches!(error, AttachmentError::OutOfReach { .. })
+                    .then(|| "place the bodies closer, or say within how far".to_owned());
+                self.error(entries.span, error.to_string(), hint);
+                None
+            }
+        }
     }
 
     /// The file's stem, with _2, _3 where another body has that name.

@@ -9,13 +9,13 @@ use super::document::{Block, Branch, Document, Settings, Tree, Unit};
 use super::lexer::{Token, tokens};
 use super::near::near_miss;
 
-const ELEMENTS: [&str; 11] =
-    ["BRANCH", "TREE", "ME", "PE", "NE", "MT", "FX", "RG", "CN", "VE", "IV"];
-const IN_BRANCH: [&str; 6] = ["ME", "MT", "CN", "VE", "BRANCH", "TREE"];
+const ELEMENTS: [&str; 12] =
+    ["BRANCH", "TREE", "ME", "PE", "NE", "MT", "FX", "RG", "CN", "VE", "IV", "AT"];
+const IN_BRANCH: [&str; 7] = ["ME", "MT", "CN", "VE", "AT", "BRANCH", "TREE"];
 const IN_TREE: [&str; 9] = ["ME", "PE", "NE", "MT", "FX", "RG", "CN", "VE", "IV"];
 
 /// Entries, and the element that each stands in.
-const ENTRIES: [(&str, &str); 26] = [
+const ENTRIES: [(&str, &str); 28] = [
     ("trans", "ME"),
     ("rot", "ME"),
     ("scale", "ME"),
@@ -42,6 +42,8 @@ const ENTRIES: [(&str, &str); 26] = [
     ("sphere", "FX"),
     ("set", "FX"),
     ("at", "RG"),
+    ("join", "AT"),
+    ("within", "AT"),
 ];
 
 /// Deeper nesting is refused, so that no text can exhaust the stack.
@@ -284,6 +286,7 @@ impl Parser<'_> {
                     let child = self.block(keyword, span, depth + 1);
                     branch.children.push(child);
                 }
+                Item::Element("AT", span) => branch.attachments.extend(self.attachment(span)),
                 Item::Element(keyword, span) => {
                     if !self.is_region(keyword) {
                         self.once(keyword, span, &mut seen);

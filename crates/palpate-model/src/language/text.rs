@@ -5,11 +5,11 @@ use std::fmt::{self, Display, Write};
 use palpate_geometry::Point;
 
 use super::document::{
-    Block, Document, FixedRegion, MaterialEntries, PathKey, RegionEntries, Rotation, Settings,
-    Transform, Tree, Unit,
+    AttachmentEntries, Block, Document, FixedRegion, MaterialEntries, PathKey, RegionEntries,
+    Rotation, Settings, Transform, Tree, Unit,
 };
 use super::lexer::is_one_word;
-use super::parser::is_keyword;
+use super::parser::{is_entry, is_keyword};
 use crate::number::{Shortest, Triple};
 
 impl Document {
@@ -38,10 +38,25 @@ fn write_block(text: &mut String, block: &Block, depth: usize) {
             write_transform(text, &branch.settings, depth + 1);
             write_settings(text, &branch.settings, depth + 1);
             branch.children.iter().for_each(|child| write_block(text, child, depth + 1));
+            branch.attachments.iter().for_each(|each| write_attachment(text, each, depth + 1));
         }
         Block::Tree(tree) => write_tree(text, tree, depth),
     }
     line(text, depth, "}");
+}
+
+fn write_attachment(text: &mut String, attachment: &AttachmentEntries, depth: usize) {
+    let [first, second] = &attachment.bodies;
+    // Unquoted, an entry would be read as the next one.
+    let quoted = |name: &str| {
+        if is_entry(name) { format!("\"{name}\"") } else { Name(name).to_string() }
+    };
+    let mut entries = vec![format!("join {} {}", quoted(first), quoted(second))];
+    let numbers = [("within", attachment.within), ("stiffness", attachment.stiffness)];
+    for (name, value) in numbers {
+        entries.extend(value.map(|value| format!("{name} {}", Shortest(value))));
+    }
+    line(text, depth, format_args!("AT{{ {} }}", entries.join("  ")));
 }
 
 fn write_tree(text: &mut String, tree: &Tree, depth: usize) {
