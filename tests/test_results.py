@@ -122,6 +122,7 @@ class Still:
 
     positions = ()
     contact_forces = ()
+    model = palpate.Model([palpate.Mesh(np.eye(4, 3), [[0, 1, 2, 3]], repair=True)])
 
     def __init__(self, time):
         self.time = time
@@ -132,7 +133,7 @@ def test_an_album_keeps_few_moments_and_finds_the_middle(cube, count):
     album = Album(palpate.Model([cube]))
     for step in range(count):
         album.add(Still(float(step)))
-    first, middle, last = (moment[0] for moment in album._three())
+    first, middle, last = (moment.time for moment in album._three())
     assert first == 0
     assert last == count - 1
     assert abs(middle - last / 2) <= max(0.5, count / 30)

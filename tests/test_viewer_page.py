@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 import palpate
-from palpate.viewer import Viewer
+from palpate.viewer import Viewer, Wishes
+from palpate.viewer.export import export_film
 from palpate.viewer.live import LivePlayer
+from palpate.viewer.protocol import decode
 
 SIZE = (640, 420)
 
@@ -175,6 +177,26 @@ def test_two_pages_and_a_lost_server(browser, page, served):
     page.wait("!palpate.broken && palpate.source.socket.readyState === 1")
     count = page.run("palpate.received")
     page.wait(f"palpate.received > {count}")
+
+
+def test_a_film_plays_without_a_server(browser, tmp_path):
+    path = tmp_path / "film.html"
+    player = LivePlayer(palpate.Simulation("small"))
+    export_film(player, path, count=12, title="a film")
+    page = browser.open(path.as_uri())
+    page.wait("globalThis.palpate?.received > 0")
+    assert page.run("document.title").startswith("a film")
+    page.wait("palpate.last.header.frame === 12 && palpate.state.playing === false")
+    shown = page.run("Array.from(palpate.positions.slice(0, 30))")
+    expected = decode(player.frame(0, Wishes(), {}))[1]["positions"].reshape(-1)[:30]
+    assert np.allclose(shown, expected, atol=1e-5)
+    page.run("palpate.send({ type: 'seek', frame: 3 })")
+    page.wait("palpate.last.header.frame === 3")
+    page.run("palpate.set({ field: 'displacement' })")
+    page.wait("!document.getElementById('legend').hidden")
+    assert page.problems == []
+    assert all(url.startswith(("file:", "data:", "blob:")) for url in page.requests)
+    page.close()
 
 
 def test_a_model_error_is_shown_as_in_the_terminal(browser, tmp_path):

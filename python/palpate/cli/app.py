@@ -15,6 +15,7 @@ from palpate.cli.detect import detect
 from palpate.cli.format import format_file
 from palpate.cli.mesh import mesh
 from palpate.cli.output import reporting
+from palpate.cli.render import render
 from palpate.cli.simulate import simulate
 from palpate.cli.tree import tree
 from palpate.cli.tune import tune
@@ -55,6 +56,7 @@ for _name, _command in (
     ("detect", detect),
     ("simulate", simulate),
     ("view", view),
+    ("render", render),
     ("tune", tune),
     ("mesh", mesh),
     ("convert", convert),

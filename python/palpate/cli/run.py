@@ -20,6 +20,7 @@ from palpate.cli.output import console, plain
 from palpate.errors import SimulationError
 from palpate.results.album import PICTURES, Album
 from palpate.results.atomic import write_bytes
+from palpate.results.drawing import looks_of, upward
 from palpate.results.frames import FrameSeries
 from palpate.results.record import Record
 from palpate.simulation import Simulation
@@ -98,6 +99,10 @@ class Run:
                 "end_time": simulation.time,
                 "wall_time": time.perf_counter() - started,
                 "frame_count": len(frames),
+                "scene": {
+                    "up": upward(simulation.model.gravity),
+                    "bodies": [asdict(look) for look in looks_of(simulation.model.bodies)],
+                },
                 **record.summary(),
             }
             self.files["report"] = self._folder / "report.json"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Annotated
 
@@ -10,9 +11,6 @@ import typer
 from palpate.cli.opening import open_model
 from palpate.cli.output import LeafSizeOption, ThreadsOption, console, parse_seconds
 from palpate.simulation import Simulation
-from palpate.viewer import Player, Viewer
-from palpate.viewer.live import LivePlayer
-from palpate.viewer.viewer import DEFAULT_PORT
 
 
 def view(
@@ -20,7 +18,7 @@ def view(
         str,
         typer.Argument(
             metavar="MODEL",
-            help="A .bml file, the name of a bundled model, a mesh file, or a checkpoint.",
+            help="A .bml file, a bundled model, a mesh, a checkpoint, or the folder of a run.",
             show_default=False,
         ),
     ],
@@ -29,7 +27,7 @@ def view(
     ] = "127.0.0.1",
     port: Annotated[
         int, typer.Option(min=0, max=65535, help="Another one is taken when this is in use.")
-    ] = DEFAULT_PORT,
+    ] = 8642,
     no_browser: Annotated[
         bool, typer.Option("--no-browser", help="Print the address only.")
     ] = False,
@@ -39,27 +37,56 @@ def view(
     ] = 1 / 60,
     threads: ThreadsOption = 1,
     leaf_size: LeafSizeOption = None,
+    export: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="Write a film as one .html file instead.", show_default=False
+        ),
+    ] = None,
+    duration: Annotated[
+        float,
+        typer.Option(
+            parser=parse_seconds, metavar="SECONDS", help="Length of the film of a model."
+        ),
+    ] = 2.0,
 ) -> None:
-    """Show a model in the browser: play it, pull at it, change it.
+    """Show a model in the browser: play it, pull at it, change it; or play a recorded run.
 
-    The page needs nothing from the internet. Ctrl-C ends it.
+    The page needs nothing from the internet, and neither does an exported film. Ctrl-C ends it.
 
     Example: palpate view case2
 
     Example: palpate view scene.bml --no-browser --port 8080
-    """
 
-    def open_live() -> Player:
-        if Path(target).suffix == ".palpate":
+    Example: palpate view out --export film.html
+    """
+    # Here, so that the other commands start without a server.
+    from palpate.viewer import Player, Viewer
+    from palpate.viewer.export import export_film
+    from palpate.viewer.live import LivePlayer
+    from palpate.viewer.recorded import RecordedPlayer, Recording
+
+    path = Path(target)
+    recorded = path.is_dir()
+
+    def open_player() -> Player:
+        if recorded:
+            return RecordedPlayer(Recording(path))
+        if path.suffix == ".palpate":
             return LivePlayer(Simulation.load(target, threads=threads))
         model, _, _ = open_model(target)
         return LivePlayer(
             Simulation(model, time_step=time_step, threads=threads, leaf_size=leaf_size)
         )
 
-    with Viewer(
-        open_live, host=host, port=port, title=Path(target).stem, play=not paused
-    ) as viewer:
+    if export is not None:
+        player = open_player()
+        count = None if recorded else math.ceil(duration / player.interval - 1e-9)
+        made = export_film(player, export, count=count, title=path.resolve().stem)
+        console().print(f"{export}: {made} frames, {export.stat().st_size / 1e6:.1f} MB")
+        return
+    title = "" if recorded else path.stem
+    with Viewer(open_player, host=host, port=port, title=title, play=not paused) as viewer:
         console().print(f"{target} at {viewer.url} (Ctrl-C ends it)")
         if not no_browser:
             viewer.open_browser()

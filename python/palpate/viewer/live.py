@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import asdict
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from palpate import pictures
 from palpate._arrays import Float64Array
 from palpate.contacts import DetectionStats
 from palpate.model import Body, Model
+from palpate.results.drawing import looks_of, upward
 from palpate.results.frames import contact_depths
 from palpate.simulation import Simulation, StepReport
 from palpate.viewer.editing import edited, settings_of, transferred
@@ -87,7 +88,7 @@ class LivePlayer(Player):
             "scene",
             {
                 "version": self._version,
-                "bodies": looks(model.bodies),
+                "bodies": rows_of(model.bodies),
                 "up": upward(model.gravity),
                 "bounds": bounds(model.bodies, self._simulation.positions),
             },
@@ -267,30 +268,16 @@ class LivePlayer(Player):
         return numbers
 
 
-def looks(bodies: tuple[Body, ...]) -> list[dict[str, Any]]:
-    """How the bodies are drawn, colours as in our pictures."""
-    rows = []
-    for index, body in enumerate(bodies):
-        rigid = body.rigid is not None
-        chosen = pictures.RIGID if rigid else pictures.PALETTE[index % len(pictures.PALETTE)]
-        rows.append(
-            {
-                "name": body.name,
-                "color": list(body.color or chosen),
-                "opacity": body.opacity,
-                "rigid": rigid,
-                "nodes": len(body.mesh.nodes),
-                "tetrahedra": len(body.mesh.tetrahedra),
-            }
-        )
-    return rows
-
-
-def upward(gravity: tuple[float, float, float]) -> list[float]:
-    """Unit vector against gravity, z where there is none."""
-    vector = -np.asarray(gravity)
-    length = float(np.linalg.norm(vector))
-    return [0.0, 0.0, 1.0] if length == 0 else (vector / length + 0.0).tolist()
+def rows_of(bodies: tuple[Body, ...]) -> list[dict[str, Any]]:
+    """The bodies for the page: look and size."""
+    return [
+        {
+            **asdict(look),
+            "nodes": len(body.mesh.nodes),
+            "tetrahedra": len(body.mesh.tetrahedra),
+        }
+        for look, body in zip(looks_of(bodies), bodies, strict=True)
+    ]
 
 
 def bounds(

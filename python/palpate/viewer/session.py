@@ -184,6 +184,8 @@ class Session:
         elif self._player is None:
             return
         elif kind == "play":
+            if command["on"] and self._player.at_end:
+                self._apply(self._player, {"type": "reset"}, client)
             self._playing = command["on"]
             self._due = 0.0
             self._costs.clear()
@@ -222,8 +224,9 @@ class Session:
 
     def _send_hello(self) -> None:
         assert self._player is not None
-        hello = {"protocol": PROTOCOL, "mode": self._player.mode, "title": self._title}
-        self._publish("hello", encode("hello", finite({**hello, **self._player.hello()})))
+        hello = {"protocol": PROTOCOL, "mode": self._player.mode, **self._player.hello()}
+        hello["title"] = self._title or hello.get("title", "")
+        self._publish("hello", encode("hello", finite(hello)))
 
     def _send_scene(self) -> None:
         assert self._player is not None

@@ -19,15 +19,35 @@ class Surfaces:
     """
 
     def __init__(self, meshes: Sequence[Mesh]) -> None:
-        self.nodes = [np.unique(mesh.triangles).astype(np.int64) for mesh in meshes]
+        self._set([mesh.triangles for mesh in meshes], [len(mesh.nodes) for mesh in meshes])
+
+    @classmethod
+    def of_triangles(
+        cls, triangles: Sequence[npt.NDArray[np.integer]], node_counts: Sequence[int]
+    ) -> Surfaces:
+        """From the surface triangles of bodies with so many nodes."""
+        surfaces = cls.__new__(cls)
+        surfaces._set(triangles, node_counts)
+        return surfaces
+
+    def _set(
+        self, triangles: Sequence[npt.NDArray[np.integer]], node_counts: Sequence[int]
+    ) -> None:
+        self.nodes = [np.unique(each).astype(np.int64) for each in triangles]
         self.triangles = [
-            np.searchsorted(nodes, mesh.triangles).astype(np.uint32)
-            for nodes, mesh in zip(self.nodes, meshes, strict=True)
+            np.searchsorted(nodes, each).astype(np.uint32)
+            for nodes, each in zip(self.nodes, triangles, strict=True)
         ]
-        self.node_counts = [len(mesh.nodes) for mesh in meshes]
+        self.node_counts = list(node_counts)
         self.offsets = _starts(self.nodes)
         self.triangle_offsets = _starts(self.triangles)
         self._stacked = np.empty((int(self.offsets[-1]), 3), dtype=np.float32)
+
+    def local_triangles(self) -> list[npt.NDArray[np.int64]]:
+        """The triangles of each body as rows of all its nodes."""
+        return [
+            nodes[triangles] for nodes, triangles in zip(self.nodes, self.triangles, strict=True)
+        ]
 
     def fits(self, positions: Sequence[Float64Array]) -> bool:
         """Whether the bodies still have as many nodes."""

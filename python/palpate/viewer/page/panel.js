@@ -237,6 +237,7 @@ export class Panel {
   }
 
   reflect(view) {
+    this.element.querySelector("#field").value = view.field ?? "";
     for (const input of this.element.querySelectorAll("[data-view]")) input.checked = view[input.dataset.view];
   }
 }

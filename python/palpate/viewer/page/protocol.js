@@ -21,7 +21,7 @@ export function decode(buffer, offset = 0, length = buffer.byteLength - offset) 
   return { header, arrays };
 }
 
-/** Positions of a frame as float32 [m]: those of a recording are whole steps from a corner. */
+/** Positions of a frame as float32 [m]: those of an exported film are whole steps from a corner. */
 export function positionsOf({ header, arrays }) {
   if (!header.quantised) return arrays.positions;
   const { low, step } = header.quantised;

@@ -27,6 +27,7 @@ export class Recording {
     this.messages = places.map(([at, size]) => decode(buffer, at, size));
     this.head = this.messages.filter((message) => message.header.type !== "frame");
     this.frames = this.messages.filter((message) => message.header.type === "frame");
+    addDifferences(this.frames);
     this.times = this.frames.map((message) => message.header.time);
     this.version = null;
     this.receive(this.head.find((message) => message.header.type === "hello"));
@@ -88,5 +89,18 @@ export class Recording {
     }
     this.clock = this.times[this.frame];
     this.tell();
+  }
+}
+
+/** Frames say how far nodes moved since the frame before; make them say where nodes are. */
+function addDifferences(frames) {
+  let before = null;
+  for (const { header, arrays } of frames) {
+    if (header.quantised.difference) {
+      const places = arrays.positions.slice();
+      for (let i = 0; i < places.length; i++) places[i] += before[i];
+      arrays.positions = places;
+    }
+    before = arrays.positions;
   }
 }

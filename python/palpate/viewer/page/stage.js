@@ -131,7 +131,7 @@ export class Stage {
     if (!(low.x <= high.x)) return;
     const half = Math.tan((this.camera.fov * Math.PI) / 360);
     const reach = Math.max(0.3, high.distanceTo(low) / 2);
-    const distance = (1.15 * reach) / (half * Math.min(1, this.camera.aspect));
+    const distance = (0.98 * reach) / (half * Math.min(1, this.camera.aspect));
     this.controls.target.copy(low).add(high).multiplyScalar(0.5);
     this.camera.position.set(0.48, 0.5, 1).normalize().multiplyScalar(distance).add(this.controls.target);
     this.controls.update();

@@ -1,0 +1,220 @@
+"""Runs read back from disk: frames, the player, films in one file, `palpate render`."""
+
+import base64
+import gzip
+import re
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from PIL import Image
+from typer.testing import CliRunner
+
+import palpate
+from palpate.cli import app
+from palpate.results.reading import RecordingError, read_frame, read_report, read_series
+from palpate.results.vtu import Grid
+from palpate.viewer import NullViewer
+from palpate.viewer.protocol import decode
+from palpate.viewer.recorded import RecordedPlayer, Recording, boundary
+from palpate.viewer.surface import Surfaces
+
+
+def run(*arguments, status=0):
+    result = CliRunner().invoke(app, [str(each) for each in arguments])
+    if result.exception is not None and not isinstance(result.exception, SystemExit):
+        raise result.exception
+    assert result.exit_code == status, result.output
+    return result.output
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    """A short run on disk."""
+    folder = tmp_path_factory.mktemp("run") / "out"
+    run("simulate", "small", "--duration", 0.2, "--every", 3, "--output", folder, "--no-pictures")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def by_hand():
+    """Positions of each frame of that run, all nodes."""
+    simulation = palpate.Simulation("small")
+    frames = [np.concatenate(simulation.positions)]
+    for _ in range(4):
+        simulation.step(3)
+        frames.append(np.concatenate(simulation.positions))
+    return simulation, frames
+
+
+@pytest.mark.parametrize("count", [1, 3, 50_000])  # the last makes several compressed blocks
+def test_frames_come_back(tmp_path, count):
+    rng = np.random.default_rng(count)
+    points = rng.normal(size=(count, 3))
+    cells = rng.integers(0, count, (7, 4))
+    values = rng.normal(size=count).astype(np.float32)
+    grid = Grid(count, [cells], {"body": np.arange(7, dtype=np.int32)})
+    path = tmp_path / "frame.vtu"
+    grid.write(path, points, {"depth": values})
+    found = read_frame(path, ("Points", "depth", "connectivity", "body", "nothing"))
+    assert np.array_equal(found["Points"], points)
+    assert np.array_equal(found["depth"], values)
+    assert np.array_equal(found["connectivity"], cells.reshape(-1))
+    assert np.array_equal(found["body"], np.arange(7))
+    assert "nothing" not in found
+
+
+def test_the_boundary_is_the_surface(make_box):
+    mesh = make_box((2, 3, 1))
+
+    def turned(triangles):
+        """Each with its smallest node first, sorted."""
+        shift = np.argmin(triangles, axis=1)[:, None]
+        return sorted(map(tuple, np.take_along_axis(triangles, (shift + np.arange(3)) % 3, 1)))
+
+    assert turned(boundary(mesh.tetrahedra.astype(np.int64))) == turned(mesh.triangles)
+
+
+def test_a_recording_plays_what_was_simulated(finished, by_hand):
+    simulation, frames = by_hand
+    surfaces = Surfaces([body.mesh for body in simulation.model.bodies])
+    ends = np.cumsum([0, *surfaces.node_counts])
+    viewer = NullViewer(lambda: RecordedPlayer(Recording(finished)))
+    assert viewer.header("hello")["mode"] == "recording"
+    assert viewer.header("hello")["times"] == pytest.approx([0, 0.05, 0.1, 0.15, 0.2])
+    assert [body["name"] for body in viewer.header("scene")["bodies"]] == [
+        "lower",
+        "middle",
+        "upper",
+        "tray",
+    ]
+    assert viewer.header("scene")["bodies"][3]["rigid"] is True
+    for index, frame in enumerate(frames):
+        parts = [frame[a:b] for a, b in pairwise(ends)]
+        viewer.send({"type": "seek", "frame": index})
+        assert viewer.header("frame")["frame"] == index
+        assert np.array_equal(viewer.arrays("frame")["positions"], surfaces.stack(parts))
+    viewer.send({"type": "seek", "frame": 10**6})
+    assert viewer.header("frame")["frame"] == 4
+    viewer.send({"type": "play", "on": True})  # from the end: again from the start
+    assert viewer.header("frame")["frame"] < 4
+    viewer.run(0.5)
+    assert viewer.header("frame")["frame"] == 4
+    assert viewer.header("state")["playing"] is False
+    for field in viewer.header("hello")["fields"]:
+        show = {"type": "show", "field": field, "contacts": True, "touching": True}
+        viewer.send(show)
+        values = viewer.arrays("frame")["field"]
+        assert len(values) == len(viewer.arrays("frame")["positions"])
+        assert values.min() >= 0
+        assert values.max() > 0 or field == "depth"  # nothing penetrates
+
+
+def test_a_run_under_way_can_be_looked_at(finished, tmp_path):
+    (tmp_path / "frames").symlink_to(finished / "frames")
+    (tmp_path / "simulation.pvd").write_bytes((finished / "simulation.pvd").read_bytes())
+    assert read_report(tmp_path) == {}
+    scene = NullViewer(lambda: RecordedPlayer(Recording(tmp_path))).header("scene")
+    assert [body["name"] for body in scene["bodies"]] == [f"body_{k}" for k in range(1, 5)]
+
+
+@pytest.mark.parametrize("damage", ["nothing", "index", "empty", "cut", "text", "report"])
+def test_damaged_runs_are_refused_by_name(finished, tmp_path, damage):
+    if damage != "nothing":
+        (tmp_path / "simulation.pvd").write_bytes((finished / "simulation.pvd").read_bytes())
+        (tmp_path / "frames").mkdir()
+        frame = (finished / "frames" / "frame_00000.vtu").read_bytes()
+        (tmp_path / "frames" / "frame_00000.vtu").write_bytes(frame)
+    if damage == "index":
+        (tmp_path / "simulation.pvd").write_text("<Collection")
+    elif damage == "empty":
+        (tmp_path / "simulation.pvd").write_text("<Collection></Collection>")
+    elif damage == "cut":
+        (tmp_path / "frames" / "frame_00000.vtu").write_bytes(frame[: len(frame) // 2])
+    elif damage == "text":
+        broken = re.sub(rb'(Name="Points"[^>]*>\n.{90})', rb"\1AAAA", frame)
+        (tmp_path / "frames" / "frame_00000.vtu").write_bytes(broken)
+    elif damage == "report":
+        (tmp_path / "report.json").write_text("{")
+    with pytest.raises(RecordingError, match=re.escape(str(tmp_path))):
+        Recording(tmp_path).frame(0)
+    assert str(tmp_path) in run("render", tmp_path, "-o", tmp_path / "x.png", status=1)
+
+
+def test_the_index_names_times_and_files(finished):
+    frames = read_series(finished)
+    assert [path.name for _, path in frames] == [f"frame_{k:05d}.vtu" for k in range(5)]
+    assert all(path.exists() for _, path in frames)
+
+
+def messages_of(page):
+    """The messages in an exported film."""
+    packed = re.search(r'id="recording">([^<]*)<', page).group(1)
+    data = gzip.decompress(base64.b64decode(packed))
+    found, at = [], 0
+    while at < len(data):
+        size = int.from_bytes(data[at : at + 4], "little")
+        found.append(decode(data[at + 4 : at + 4 + size]))
+        at += 4 + size
+    return found
+
+
+def test_a_film_holds_the_frames(finished, by_hand, tmp_path):
+    simulation, frames = by_hand
+    path = tmp_path / "film.html"
+    assert "5 frames" in run("view", finished, "--export", path)
+    page = path.read_text()
+    assert not re.search(r"(src|href)=\"(?!data:)", page)
+    assert '"./' not in page
+    (hello, _), _, *rest = messages_of(page)
+    assert (hello["mode"], len(hello["times"])) == ("recording", 5)
+    surfaces = Surfaces([body.mesh for body in simulation.model.bodies])
+    ends = np.cumsum([0, *surfaces.node_counts])
+    whole = np.zeros((len(rest[0][1]["positions"]), 3), dtype=np.uint16)
+    for (header, arrays), frame in zip(rest, frames, strict=True):
+        difference = header["quantised"]["difference"]
+        whole = whole + arrays["positions"] if difference else arrays["positions"]
+        step = np.array(header["quantised"]["step"])
+        parts = [frame[a:b] for a, b in pairwise(ends)]
+        off = whole * step + header["quantised"]["low"] - surfaces.stack(parts)
+        assert (np.abs(off) <= 0.51 * step + 1e-8).all()
+        assert step.max() < 1e-5
+
+
+def test_a_film_of_a_model(tmp_path):
+    path = tmp_path / "film.html"
+    assert "4 frames" in run("view", "small", "--export", path, "--duration", 0.05)
+    assert len(messages_of(path.read_text())) == 2 + 4
+
+
+def test_render_draws_models_and_runs(finished, tmp_path):
+    still, strip, film = (tmp_path / name for name in ("a.png", "b.png", "c.gif"))
+    run("render", "small", "-o", still, "--width", 200)
+    run("render", finished, "-o", strip, "--frames", 3, "--width", 200)
+    run("render", "small", "-o", film, "--duration", 0.1, "--frames", 4, "--width", 160)
+    with Image.open(still) as one, Image.open(strip) as three:
+        assert one.width == 200
+        assert three.width == 3 * 200 + 2 * 8
+        assert len(one.convert("RGB").getcolors(1 << 20)) > 200
+    with Image.open(film) as moving:
+        assert (moving.n_frames, moving.width) == (4, 160)
+        first = np.asarray(moving.convert("RGB"), dtype=int)
+        assert moving.info["duration"] == pytest.approx(33, abs=8)
+        moving.seek(3)
+        assert np.abs(np.asarray(moving.convert("RGB"), dtype=int) - first).max() > 60
+        assert moving.info["duration"] == 1200
+    assert sorted(each.name for each in tmp_path.iterdir()) == ["a.png", "b.png", "c.gif"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "text"),
+    [
+        (["small", "-o", "x.jpg"], 2, "png"),
+        (["small", "--frames", "3"], 2, "duration"),
+        (["nothing.bml"], 1, "nothing.bml"),
+    ],
+)
+def test_render_refuses(tmp_path, monkeypatch, arguments, status, text):
+    monkeypatch.chdir(tmp_path)
+    assert text in run("render", *arguments, status=status)
+    assert list(tmp_path.iterdir()) == []
