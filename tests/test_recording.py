@@ -104,7 +104,7 @@ def test_a_recording_plays_what_was_simulated(finished, by_hand):
     for field in viewer.header("hello")["fields"]:
         show = {"type": "show", "field": field, "contacts": True, "touching": True}
         viewer.send(show)
-        values = viewer.arrays("frame")["field"]
+        values = viewer.arrays("frame")[f"field/{field}"]
         assert len(values) == len(viewer.arrays("frame")["positions"])
         assert values.min() >= 0
         assert values.max() > 0 or field == "depth"  # nothing penetrates

@@ -19,7 +19,7 @@ from palpate.viewer.live import LivePlayer
 from palpate.viewer.page import page_files
 from palpate.viewer.probe import aim, probe_mesh
 from palpate.viewer.protocol import PROTOCOL, ProtocolError, decode, encode, parse_command
-from palpate.viewer.surface import Surfaces, deformation
+from palpate.viewer.surface import Strain, Surfaces, deformation
 
 _JSON = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=8),
@@ -137,6 +137,18 @@ def test_deformation_does_not_see_rigid_motion(make_box):
     assert np.allclose(deformation(nodes, moved), 0, atol=1e-12)
     assert deformation(nodes, moved * (1, 1, 1.5)).max() > 0.05
     assert deformation(nodes, nodes * (1, 1, -1)).max() > 0.1  # a mirror is no motion
+
+
+def test_strain_of_a_stretch(make_box):
+    mesh = make_box((2, 3, 2))
+    strain = Strain(mesh)
+    turn = np.linalg.qr(np.random.default_rng(2).normal(size=(3, 3)))[0]
+    turn *= np.sign(np.linalg.det(turn))
+    assert np.allclose(strain.of(mesh.nodes @ turn.T + 7), 0, atol=1e-12)
+    assert np.allclose(strain.of(2 * mesh.nodes), 0, atol=1e-12)  # it changes volume, not shape
+    stretched = strain.of((mesh.nodes * (1.2, 1, 1)) @ turn.T)
+    assert np.allclose(stretched, 2 / 3 * (1.2**2 - 1) / 2)
+    assert not Strain(palpate.Mesh(mesh.nodes, triangles=mesh.triangles)).of(mesh.nodes * 2).any()
 
 
 def test_the_probe_is_closed_and_points_where_it_aims():
@@ -259,6 +271,22 @@ def test_a_path_goes_on_when_settings_change(make_box):
     assert viewer.arrays("frame")["positions"][:8, 2].min() == pytest.approx(0.75, abs=1e-5)
 
 
+def test_ties_stay_when_settings_change(make_box):
+    lower, upper = make_box((2, 2, 2)), make_box((2, 2, 2), origin=(0.3, 0, 1.02))
+    model = palpate.Model(
+        [palpate.Body(lower, name="lower", rigid=()), palpate.Body(upper, name="upper")],
+        attachments=[palpate.Attachment("upper", "lower", within=0.1, stiffness=1e6)],
+    )
+    tied = model.attachments[0]
+    assert 0 < len(tied.nodes) < len(upper.nodes)
+    viewer = NullViewer(player := LivePlayer(palpate.Simulation(model)))
+    viewer.send({"type": "step", "count": 3})
+    viewer.send({"type": "settings", "body": 1, "material": {"young": 9e5}})
+    (again,) = player.simulation.model.attachments
+    assert np.array_equal(again.nodes, tied.nodes)
+    assert again.stiffness == tied.stiffness
+
+
 def test_bad_settings_change_nothing_and_are_told(viewer):
     viewer.send({"type": "settings", "body": 17, "material": {"young": 9e4}})
     assert "17" in viewer.header("notice")["text"]
@@ -275,14 +303,16 @@ def test_pages_get_what_any_of_them_wants(viewer):
     viewer.send(show, client=1)
     viewer.send({"type": "show", "field": None, "contacts": False, "touching": False}, client=2)
     arrays = viewer.arrays("frame")
-    assert {"field", "contact_points", "touching"} <= set(arrays)
+    assert {"field/deformation", "contact_points", "touching"} <= set(arrays)
     assert len(arrays["contact_points"]) == len(arrays["contact_forces"]) > 10
-    assert len(arrays["field"]) == len(arrays["positions"])
-    for field in ("displacement", "depth", "force"):
+    viewer.send({"type": "show", "field": "depth", "contacts": False, "touching": False}, client=2)
+    for field in ("displacement", "deformation", "strain", "force"):
         viewer.send({**show, "field": field})
-        assert viewer.header("frame")["field"] == field
-        assert viewer.arrays("frame")["field"].min() >= 0
-    assert viewer.arrays("frame")["field"].max() > 0
+        values = viewer.arrays("frame")[f"field/{field}"]
+        assert len(values) == len(arrays["positions"])
+        assert 0 == values.min() < values.max()
+    assert len(viewer.arrays("frame")["field/depth"]) == len(values)
+    viewer.send({"type": "show", "field": None, "contacts": False, "touching": False}, client=2)
     viewer.leave(1)
     viewer.send({"type": "step", "count": 1}, client=2)
     assert list(viewer.arrays("frame")) == ["positions"]
@@ -379,6 +409,18 @@ def test_a_step_that_fails_pauses_and_says_why(make_box):
     viewer.send({"type": "play", "on": True})
     assert "the test broke it" in viewer.header("problem")["text"]
     assert viewer.header("state")["playing"] is False
+
+
+def test_one_may_step_it_oneself():
+    simulation = palpate.Simulation("small")
+    with (
+        simulation.view(port=0, browser=False, play=False, block=False) as viewer,
+        talk(viewer) as page,
+    ):
+        assert read(page, "frame")[0]["time"] == 0
+        simulation.step(3)
+        viewer.update()
+        assert read(page, "frame")[0]["time"] == pytest.approx(0.05)
 
 
 # --- the server

@@ -204,12 +204,11 @@ def test_a_model_error_is_shown_as_in_the_terminal(browser, tmp_path):
     path.write_text("BRANCH {\n  TREE { NE small.seg  MT{ yuong 5 } }\n}\n")
     with pytest.raises(palpate.ModelError) as caught:
         palpate.read_model(path)
-    with Viewer(lambda: LivePlayer(palpate.Simulation(path)), port=0) as viewer:
+    with Viewer(lambda: LivePlayer(palpate.Simulation(path)), port=0, watch=path) as viewer:
         page = browser.open(viewer.url)
         page.wait("globalThis.palpate && !document.getElementById('problem').hidden")
         assert page.run("document.querySelector('#problem pre').textContent") == str(caught.value)
-        path.write_text("BRANCH {\n  TREE { NE small.seg  MT{ young 5000 } }\n}\n")
         (tmp_path / "small.seg").write_bytes((palpate.model.MODELS / "small.seg").read_bytes())
-        page.run("document.querySelector('#problem button').click()")
+        path.write_text("BRANCH {\n  TREE { NE small.seg  MT{ young 5000 } }\n}\n")
         page.wait("palpate.received > 1 && document.getElementById('problem').hidden")
         page.close()

@@ -86,7 +86,12 @@ def view(
         console().print(f"{export}: {made} frames, {export.stat().st_size / 1e6:.1f} MB")
         return
     title = "" if recorded else path.stem
-    with Viewer(open_player, host=host, port=port, title=title, play=not paused) as viewer:
+    watch = path if path.suffix == ".bml" else None
+    with Viewer(
+        open_player, host=host, port=port, title=title, play=not paused, watch=watch
+    ) as viewer:
+        if host not in ("127.0.0.1", "localhost", "::1"):
+            console(error=True).print("note: everyone who reaches this address can use the page")
         console().print(f"{target} at {viewer.url} (Ctrl-C ends it)")
         if not no_browser:
             viewer.open_browser()

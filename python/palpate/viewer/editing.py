@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
-from palpate.model import Body, Model, RigidKey
+import numpy as np
+
+from palpate.model import Attachment, Body, Model, RigidKey
+from palpate.scene import Scene
 from palpate.simulation import Simulation
 from palpate.viewer.protocol import Command
 
@@ -46,8 +49,28 @@ def edited(model: Model, command: Command) -> Model:
             material=replace(body.material, **command["material"]),
             contact=replace(body.contact, **command["contact"]),
         )
-    gravity = model.gravity if command["gravity"] is None else command["gravity"]
-    return Model(bodies, gravity=gravity)
+    return remade(model, bodies, command["gravity"])
+
+
+def remade(
+    model: Model, bodies: Sequence[Body], gravity: tuple[float, float, float] | None = None
+) -> Model:
+    """The model with other bodies, the first of them in the same places, tied as before."""
+    ties = [
+        replace(tie, within=_reach(model, tie), nodes=None)
+        for tie in model.attachments
+        if tie.nodes is not None and len(tie.nodes)
+    ]
+    gravity = model.gravity if gravity is None else gravity
+    return Model(bodies, gravity=gravity, attachments=ties)
+
+
+def _reach(model: Model, tie: Attachment) -> float:
+    """The distance [m] within which exactly the tied nodes lie: that of the farthest."""
+    first, second = (model.bodies[model.body_index(each)] for each in (tie.first, tie.second))
+    tied = first.mesh.nodes[np.asarray(tie.nodes)]
+    distances = Scene([second.mesh]).closest(tied).distances
+    return float(distances.max()) * (1 + 1e-9) + 1e-12
 
 
 def transferred(
@@ -61,7 +84,7 @@ def transferred(
         replace(body, rigid=_earlier(body.rigid, before.time)) if body.rigid else body
         for body in model.bodies
     ]
-    after = make(Model(bodies, gravity=model.gravity))
+    after = make(remade(model, bodies))
     states = zip(model.bodies, before.positions, before.velocities, strict=False)
     for index, (body, positions, velocities) in enumerate(states):
         if body.rigid is None:

@@ -11,6 +11,7 @@ from palpate.hands import Pull
 from palpate.mesh import Mesh
 from palpate.model import Body, Contact, Model
 from palpate.simulation import Simulation
+from palpate.viewer.editing import remade
 from palpate.viewer.probe import NAME, aim, probe_mesh
 from palpate.viewer.protocol import Command
 from palpate.viewer.surface import Surfaces
@@ -76,7 +77,7 @@ class Hands:
             contact=Contact(self_contact=False),
             color=(0.62, 0.66, 0.72),
         )
-        return Model([*bodies, body], gravity=model.gravity)
+        return remade(model, [*bodies, body])
 
     def obey(self, command: Command, client: int, surfaces: Surfaces) -> None:
         """Carry out grab, drag, release, tool or tool_away."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from dataclasses import asdict
 from itertools import pairwise
 from typing import Any
@@ -21,10 +20,11 @@ from palpate.viewer.editing import edited, settings_of, transferred
 from palpate.viewer.hands import Hands
 from palpate.viewer.player import Outcome, Player, Wishes
 from palpate.viewer.protocol import Command, encode, finite
-from palpate.viewer.surface import Surfaces, deformation
+from palpate.viewer.surface import Strain, Surfaces, deformation
 
 #: Seconds between two counts of the tested triangle pairs while nobody looks at them closely.
 _COUNT_INTERVAL = 0.5
+_FIELDS = ("displacement", "deformation", "strain", "depth", "force")
 #: States before a cut that are kept at most.
 _UNDO = 16
 
@@ -48,6 +48,8 @@ class LivePlayer(Player):
         self._stats: DetectionStats | None = None
         self._counted = 0.0
         self._undo: list[Any] = []
+        self._strain: list[Strain] = []
+        self._strain_version = -1
         self._hands = Hands(simulation)
 
     @property
@@ -71,10 +73,7 @@ class LivePlayer(Player):
         features = ["settings", "reset", "pull", "tool"]
         if hasattr(self._simulation, "cut"):
             features.append("cut")
-        fields = ["displacement", "deformation", "depth", "force"]
-        if hasattr(self._simulation, "von_mises"):
-            fields.append("stress")
-        return {"features": features, "fields": fields}
+        return {"features": features, "fields": _FIELDS}
 
     def scene(self) -> bytes:
         model = self._simulation.model
@@ -117,10 +116,8 @@ class LivePlayer(Player):
         simulation = self._simulation
         positions = simulation.positions
         arrays: dict[str, npt.NDArray[Any]] = {"positions": self._surfaces.stack(positions)}
-        if wishes.field is not None:
-            values = self._field(wishes.field, positions)
-            if values is not None:
-                arrays["field"] = self._surfaces.stack_values(values)
+        for name in wishes.fields.intersection(_FIELDS):
+            arrays[f"field/{name}"] = self._surfaces.stack_values(self._field(name, positions))
         if wishes.contacts:
             contacts = simulation.contacts
             arrays["contact_points"] = contacts.points.astype(np.float32)
@@ -137,7 +134,6 @@ class LivePlayer(Player):
             "version": self._version,
             "number": number,
             "time": self.time,
-            "field": wishes.field if "field" in arrays else None,
             "numbers": {**numbers, **self._numbers()},
             **self._hands.shown(),
         }
@@ -234,7 +230,7 @@ class LivePlayer(Player):
         self._rest = tuple(body.mesh.nodes for body in bodies)
         self._version += 1
 
-    def _field(self, name: str, positions: tuple[Float64Array, ...]) -> list[Float64Array] | None:
+    def _field(self, name: str, positions: tuple[Float64Array, ...]) -> list[Float64Array]:
         """A number per node of each body."""
         pairs = list(zip(self._rest, positions, strict=True))
         if name == "displacement":
@@ -243,12 +239,17 @@ class LivePlayer(Player):
             return [deformation(rest, now) for rest, now in pairs]
         if name == "force":
             return [np.linalg.norm(each, axis=1) for each in self._simulation.contact_forces]
-        if name == "depth":
-            offsets = np.concatenate([[0], np.cumsum([len(each) for each in positions])])
-            depths = contact_depths(self._simulation, offsets)
-            return [depths[start:end] for start, end in pairwise(offsets)]
-        stress: Callable[[], Any] | None = getattr(self._simulation, "von_mises", None)
-        return None if stress is None else list(stress())
+        if name == "strain":
+            return [strain.of(now) for strain, now in zip(self._strains(), positions, strict=True)]
+        offsets = np.concatenate([[0], np.cumsum([len(each) for each in positions])])
+        depths = contact_depths(self._simulation, offsets)
+        return [depths[start:end] for start, end in pairwise(offsets)]
+
+    def _strains(self) -> list[Strain]:
+        if self._strain_version != self._version:
+            self._strain = [Strain(body.mesh) for body in self._simulation.model.bodies]
+            self._strain_version = self._version
+        return self._strain
 
     def _numbers(self) -> dict[str, Any]:
         numbers: dict[str, Any] = {}

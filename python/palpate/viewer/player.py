@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 from palpate.viewer.protocol import Command
@@ -13,17 +13,16 @@ from palpate.viewer.protocol import Command
 class Wishes:
     """What the pages want to see in each frame, beside the positions."""
 
-    field: str | None = None
+    fields: frozenset[str] = frozenset()
     contacts: bool = False
     touching: bool = False
 
     def joined(self, other: Wishes) -> Wishes:
-        """What serves both; of two fields the later one."""
-        return replace(
-            self,
-            field=other.field or self.field,
-            contacts=self.contacts or other.contacts,
-            touching=self.touching or other.touching,
+        """What serves both."""
+        return Wishes(
+            self.fields | other.fields,
+            self.contacts or other.contacts,
+            self.touching or other.touching,
         )
 
 

@@ -17,7 +17,7 @@ padded with blanks so that what follows is aligned to four; then the arrays that
 ``frame``
     ``version`` of the scene it belongs to, ``number``, ``time`` [s], ``numbers`` (rates, times per
     stage, counts), ``pulls``, ``tool``; arrays ``positions`` (N, 3) float32 of all bodies' surface
-    nodes in the order of the scene, and on request ``field`` (N,), ``contact_points``,
+    nodes in the order of the scene, and on request ``field/NAME`` (N,), ``contact_points``,
     ``contact_normals`` (k, 3), ``contact_forces`` (k,), ``touching`` (t,) uint32, triangles of all
     bodies in order.
 ``notice``, ``problem``
@@ -40,7 +40,7 @@ import numpy.typing as npt
 PROTOCOL = 1
 
 #: Fields of a frame that a page may ask for.
-FIELDS = ("displacement", "deformation", "stress", "depth", "force")
+FIELDS = ("displacement", "deformation", "strain", "depth", "force")
 
 Command: TypeAlias = dict[str, Any]
 Arrays: TypeAlias = Mapping[str, npt.NDArray[Any]]

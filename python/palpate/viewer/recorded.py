@@ -201,14 +201,13 @@ class RecordedPlayer(Player):
         surfaces = self._parts.surfaces
         points = self._parts.split(self._arrays["Points"])
         message: dict[str, npt.NDArray[Any]] = {"positions": surfaces.stack(points)}
-        if wishes.field in _FIELDS:
-            message["field"] = surfaces.stack_values(self._field(wishes.field, points))
+        for name in wishes.fields.intersection(_FIELDS):
+            message[f"field/{name}"] = surfaces.stack_values(self._field(name, points))
         header = {
             "version": self._version,
             "number": number,
             "frame": self._index,
             "time": self.time,
-            "field": wishes.field if "field" in message else None,
         }
         return encode("frame", finite(header), message)
 

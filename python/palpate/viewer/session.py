@@ -7,6 +7,7 @@ import time
 import traceback
 from collections import deque
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 from palpate.errors import ModelError, PalpateError
@@ -19,6 +20,8 @@ FRAME_RATE = 60.0
 _QUEUE = 2000
 #: Steps that the rates are the mean of.
 _RECENT = 60
+#: Seconds between two looks at a file that could not be read.
+_LOOK = 0.5
 #: Seconds that playing may lie behind before the debt is forgiven.
 _PATIENCE = 0.1
 
@@ -29,7 +32,7 @@ class Session:
     """Plays what ``open_player`` returns; ``publish`` gets each message and its type.
 
     ``open_player`` runs in the session's thread, again on the command ``reload``; what it raises is
-    shown as a problem.
+    shown as a problem, and it is tried again when the file ``watch`` changes.
     """
 
     def __init__(
@@ -39,8 +42,11 @@ class Session:
         *,
         title: str = "",
         play: bool = True,
+        watch: Path | None = None,
     ) -> None:
         self._open = open_player
+        self._watch = watch
+        self._seen: int | None = None
         self._publish = publish
         self._title = title
         self._playing = play
@@ -88,8 +94,15 @@ class Session:
 
     def leave(self, client: int) -> None:
         """A page is gone."""
+        self._insist(client, "leave")
+
+    def refresh(self) -> None:
+        """Show the present state, which something else than this session has changed."""
+        self._insist(0, "refresh")
+
+    def _insist(self, client: int, kind: str) -> None:
         with self._wake:
-            self._commands.append((client, {"type": "leave"}))
+            self._commands.append((client, {"type": kind}))
             self._wake.notify()
 
     def pump(self, clock: Callable[[], float] = time.perf_counter) -> float | None:
@@ -113,6 +126,7 @@ class Session:
     def open(self) -> None:
         """Open the player and publish hello, scene, state and the first frame."""
         self._player = None
+        self._seen = self._changed_file()
         try:
             self._player = self._open()
         except Exception as error:
@@ -132,10 +146,19 @@ class Session:
         while True:
             with self._wake:
                 if not self._commands and not self._stopping and wait != 0.0:
-                    self._wake.wait(wait)
+                    self._wake.wait(_LOOK if self._player is None else wait)
                 if self._stopping:
                     return
+            if self._player is None and self._changed_file() != self._seen:
+                self.open()
             wait = self.pump()
+
+    def _changed_file(self) -> int | None:
+        """When the watched file was written."""
+        try:
+            return None if self._watch is None else self._watch.stat().st_mtime_ns
+        except OSError:
+            return None
 
     def _advance(self, clock: Callable[[], float], now: float) -> None:
         player = self._player
@@ -177,9 +200,11 @@ class Session:
             if self._player is not None:
                 self._player.leave(client)
         elif kind == "show":
-            self._wishes[client] = Wishes(
-                command["field"], command["contacts"], command["touching"]
-            )
+            field = command["field"]
+            fields = frozenset([field] if field is not None else [])
+            self._wishes[client] = Wishes(fields, command["contacts"], command["touching"])
+            self._stale = True
+        elif kind == "refresh":
             self._stale = True
         elif self._player is None:
             return

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from palpate._arrays import Float64Array
+from palpate._arrays import Float64Array, IndexArray
 from palpate.mesh import Mesh
 
 
@@ -85,3 +85,37 @@ def deformation(rest: Float64Array, positions: Float64Array) -> Float64Array:
     rotation = (left * np.array([1.0, 1.0, turn])) @ right
     off: Float64Array = np.linalg.norm(after - before @ rotation, axis=1)
     return off
+
+
+class Strain:
+    """Equivalent strain of a body's tetrahedra, as seen at its nodes.
+
+    ``sqrt(2/3 e:e)`` of the deviator e of Green and Lagrange's strain, the mean of a node's
+    tetrahedra; it needs no material, and rigid motion has none.
+    """
+
+    def __init__(self, mesh: Mesh) -> None:
+        self._tetrahedra = mesh.tetrahedra
+        self._count = len(mesh.nodes)
+        edges = _edges(mesh.nodes, mesh.tetrahedra)
+        self._inverse = np.linalg.inv(edges)
+        users = np.bincount(mesh.tetrahedra.reshape(-1), minlength=self._count)
+        self._share = 1 / np.maximum(users, 1)
+
+    def of(self, positions: Float64Array) -> Float64Array:
+        """One number per node, (n,)."""
+        gradient = self._inverse @ _edges(positions, self._tetrahedra)  # of the motion, transposed
+        green = 0.5 * (gradient @ np.swapaxes(gradient, 1, 2) - np.eye(3))
+        trace = np.trace(green, axis1=1, axis2=2)
+        squared = np.einsum("mij,mij->m", green, green) - trace**2 / 3
+        strain = np.sqrt(np.maximum(squared, 0) * (2 / 3))
+        nodes = self._tetrahedra.reshape(-1)
+        total = np.bincount(nodes, weights=np.repeat(strain, 4), minlength=self._count)
+        at_nodes: Float64Array = total * self._share
+        return at_nodes
+
+
+def _edges(nodes: Float64Array, tetrahedra: IndexArray) -> Float64Array:
+    """Rows: from the first node to the three others, (m, 3, 3)."""
+    edges: Float64Array = nodes[tetrahedra[:, 1:]] - nodes[tetrahedra[:, :1]]
+    return edges

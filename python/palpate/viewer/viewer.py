@@ -7,6 +7,7 @@ import json
 import threading
 import webbrowser
 from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy.typing as npt
@@ -44,6 +45,8 @@ class Viewer:
         Name at the top of the page.
     play : bool
         Whether it plays at once.
+    watch : Path, optional
+        The model's file: while it has errors, it is read again when it changes.
 
     Raises
     ------
@@ -59,9 +62,12 @@ class Viewer:
         port: int = DEFAULT_PORT,
         title: str = "",
         play: bool = True,
+        watch: Path | None = None,
     ) -> None:
         self._server = Server(host, port)
-        self._session = Session(open_player, self._server.publish, title=title, play=play)
+        self._session = Session(
+            open_player, self._server.publish, title=title, play=play, watch=watch
+        )
         self._closed = threading.Event()
         try:
             self._server.start(self._session)
@@ -85,6 +91,10 @@ class Viewer:
             return webbrowser.open(self.url)
         except webbrowser.Error:
             return False
+
+    def update(self) -> None:
+        """Show the present state of a simulation that you step yourself (``play=False``)."""
+        self._session.refresh()
 
     def wait(self) -> None:
         """Wait for `close` or Ctrl-C."""
@@ -122,8 +132,15 @@ class NullViewer:
     3
     """
 
-    def __init__(self, source: Simulation | Callable[[], Player], *, play: bool = False) -> None:
-        opener = source if callable(source) else lambda: LivePlayer(source)
+    def __init__(
+        self, source: Simulation | Player | Callable[[], Player], *, play: bool = False
+    ) -> None:
+
+        def opener() -> Player:
+            if isinstance(source, Player):
+                return source
+            return source() if callable(source) else LivePlayer(source)
+
         self._messages: dict[str, bytes] = {}
         self.sent: list[str] = []
         self._session = Session(opener, self._keep, play=play)

@@ -32,7 +32,7 @@ export function rampIndex(value) {
 export const FIELDS = {
   displacement: { name: "Displacement", unit: "m" },
   deformation: { name: "Deformation", unit: "m", note: "off the best rigid motion" },
-  stress: { name: "Von Mises stress", unit: "Pa" },
+  strain: { name: "Strain", unit: "", note: "equivalent strain, the mean around each node" },
   depth: { name: "Penetration depth", unit: "m" },
   force: { name: "Contact force", unit: "N" },
 };

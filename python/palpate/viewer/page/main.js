@@ -9,6 +9,9 @@ import { PROTOCOL, positionsOf } from "palpate/protocol";
 import { Recording } from "palpate/recording";
 import { Stage } from "palpate/stage";
 
+/** Name of the body that pushes, see `probe.py`. */
+const PROBE = "probe";
+
 const find = (name) => document.getElementById(name);
 
 class App {
@@ -102,6 +105,8 @@ class App {
     this.paint(header, arrays, positions);
     this.transport.moment(header);
     this.chips(header);
+    const probe = this.stage.bodies.find((body) => body.look.name === PROBE);
+    if (probe) probe.visible = Boolean(header.tool);
     if (header.numbers) {
       if (header.numbers.times) this.panel.chart.add(header.numbers.times, this.state?.time_step ?? 0);
       this.figures(header.numbers);
@@ -119,13 +124,10 @@ class App {
   }
 
   paint(header, arrays, positions) {
-    let values = arrays.field ?? null;
-    let field = header.field;
-    if (this.modeOfSource === "recording" && this.view.field === "displacement") {
-      values = this.displacements(positions);
-      field = "displacement";
-    }
-    if (!this.view.field || !values || field !== this.view.field) {
+    const { field } = this.view;
+    let values = arrays[`field/${field}`] ?? null;
+    if (!values && header.quantised && field === "displacement") values = this.displacements(positions);
+    if (!field || !values) {
       for (const body of this.stage.bodies) body.paint(null);
       showLegend(find("legend"), null);
       return;
@@ -138,7 +140,7 @@ class App {
     // The range grows at once and shrinks slowly, so that colours do not flicker.
     this.high = Math.max(most, 0.985 * this.high);
     for (const body of this.stage.bodies) body.paint(body.look.rigid ? null : values, this.high || 1);
-    showLegend(find("legend"), this.view.field, this.high);
+    showLegend(find("legend"), field, this.high);
   }
 
   displacements(positions) {

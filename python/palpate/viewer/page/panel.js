@@ -151,7 +151,8 @@ export class Panel {
           this.open[more.hidden ? "delete" : "add"](body.look.name);
           this.fill(index);
         };
-        const row = make("div", { class: "body" }, make("div", { class: "top" }, swatch, who, make("span", { class: "what" }, what), eye), more);
+        const hidden = app.can("tool") && body.look.name === "probe";
+        const row = make("div", { class: "body", hidden }, make("div", { class: "top" }, swatch, who, make("span", { class: "what" }, what), eye), more);
         row.more = more;
         return row;
       }),

@@ -15,6 +15,7 @@ const PREFIXES = [[1e9, "G"], [1e6, "M"], [1e3, "k"], [1, ""], [1e-3, "m"], [1e-
 export function withUnit(value, unit) {
   if (!Number.isFinite(value)) return "–";
   const size = Math.abs(value);
+  if (!unit) return `${digits(100 * value)} %`;
   if (size < 1e-9) return `0 ${unit}`;
   if (unit === "m" && size >= 0.01 && size < 1) return `${digits(100 * value)} cm`;
   const [factor, prefix] = PREFIXES.find(([each]) => size >= each * 0.9995) ?? PREFIXES.at(-1);
