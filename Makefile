@@ -9,7 +9,7 @@ SOURCES := pyproject.toml Cargo.toml Cargo.lock $(shell find crates -name '*.rs'
 CRATES := --workspace --exclude palpate-python
 
 .DEFAULT_GOAL := help
-.PHONY: help install run test test-rust test-python soak lint format bench models clean
+.PHONY: help install run test test-rust test-python soak lint format bench docs wheel models clean
 
 help: ## Show this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /\1\t/' | expand -t 14
@@ -48,18 +48,30 @@ lint: install ## Check format, clippy, rustdoc, ruff and types
 	cargo fmt --all --check
 	cargo clippy --locked --workspace --all-targets --release -- -D warnings
 	RUSTDOCFLAGS="-D warnings" cargo doc --locked --release --no-deps --workspace --exclude palpate-python
-	$(BIN)/ruff format --check python tests examples
-	$(BIN)/ruff check python tests examples
+	$(BIN)/ruff format --check python tests examples docs
+	$(BIN)/ruff check python tests examples docs
 	$(BIN)/mypy
 	$(BIN)/python -m mypy.stubtest palpate._core
 
 format: install ## Format Rust and Python
 	cargo fmt --all
-	$(BIN)/ruff format python tests examples
-	$(BIN)/ruff check --fix python tests examples
+	$(BIN)/ruff format python tests examples docs
+	$(BIN)/ruff check --fix python tests examples docs
+
+docs: $(VENV)/.docs ## Build the manual: docs/_build/html/index.html
+	$(BIN)/sphinx-build -W --keep-going -q -b html docs docs/_build/html
+	@echo docs/_build/html/index.html
+
+$(VENV)/.docs: $(VENV)/.installed
+	VIRTUAL_ENV=$(abspath $(VENV)) $(BIN)/maturin develop --release --locked --extras all,test,lint,docs
+	@touch $@
+
+wheel: $(BIN)/maturin ## Build a wheel for any Python from 3.10 on, and try it in an empty environment
+	$(BIN)/maturin build --release --locked --strip --out dist
+	$(PYTHON) tests/try_wheel.py dist
 
 models: install ## Make the example organs again
 	$(BIN)/python python/palpate/models/make_models.py
 
 clean: ## Remove everything that was built
-	rm -rf target $(VENV) out
+	rm -rf target $(VENV) out dist docs/_build

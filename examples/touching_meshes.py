@@ -5,7 +5,9 @@ import numpy as np
 import palpate
 
 
-def box(cells, size, origin):
+def box(
+    cells: tuple[int, int, int], size: float, origin: tuple[float, float, float]
+) -> tuple[np.ndarray, np.ndarray]:
     """Nodes and tetrahedra of a box, six tetrahedra per cell."""
     grid = np.stack(np.meshgrid(*[np.arange(n + 1) for n in cells], indexing="ij"), axis=-1)
     nodes = grid.reshape(-1, 3) * (size / np.array(cells)) + origin

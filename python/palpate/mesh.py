@@ -146,7 +146,7 @@ class Mesh:
 
     @cached_property
     def volume(self) -> float:
-        """Volume [m³]: of the tetrahedra, or enclosed by a closed surface."""
+        """Volume of the tetrahedra, or enclosed by a closed surface [m³]."""
         return self._core.volume
 
     @property

@@ -23,6 +23,8 @@ TOLERANCE = 0.05
 WELD = 1e-6
 #: How near to the wanted number of nodes is near enough, and how often to try.
 NEAR, TRIES = 0.1, 4
+#: So many times more nodes than the length alone asks for make the surface follow the given one.
+TOLERANCE_ADDS = 1.9
 
 
 def mesh_surface(
@@ -82,7 +84,7 @@ def mesh_surface(
     if volume <= 1e-9 * extent**3:
         raise MeshError("the surface encloses no volume")
 
-    def fill(length: float) -> Mesh:
+    def fill(length: float, tell: Progress) -> Mesh:
         if length > extent:
             raise MeshError(
                 f"edges of {length:.3g} m in a body of {extent:.3g} m: make them shorter"
@@ -94,7 +96,7 @@ def mesh_surface(
 
     if wanted is None:
         assert edge_length is not None
-        mesh = fill(float(edge_length))
+        mesh = fill(float(edge_length), tell)
     else:
         area = float(np.linalg.norm(_area_vectors(points, triangles), axis=1).sum())
         mesh = _with_nodes(fill, wanted, volume, area, tell)
@@ -121,24 +123,34 @@ def _positive(value: Any, name: str) -> float:
 
 
 def _with_nodes(fill: Any, wanted: int, volume: float, area: float, tell: Progress) -> Mesh:
-    """The mesh that comes nearest to a number of nodes: estimate, make, correct, make again."""
-    factor = 1.5  # what a tolerance adds, learned from each try
+    """The mesh that comes nearest to a number of nodes: estimate a length, make, correct it."""
+    length = _length_for(wanted / TOLERANCE_ADDS, volume, area)
+    tried: list[tuple[float, float]] = []  # logarithms of lengths and of nodes
     best: Mesh | None = None
     for attempt in range(TRIES):
-        length = _length_for(wanted / factor, volume, area)
 
         def telling(text: str, attempt: int = attempt, length: float = length) -> None:
             tell(f"try {attempt + 1}, edges of {1e3 * length:.3g} mm: {text}")
 
         telling("starting")
-        mesh: Mesh = fill(length)
+        mesh: Mesh = fill(length, telling)
         if best is None or _miss(mesh, wanted) < _miss(best, wanted):
             best = mesh
         if abs(len(mesh.nodes) / wanted - 1) <= NEAR:
             break
-        factor *= len(mesh.nodes) / wanted
+        tried.append((math.log(length), math.log(len(mesh.nodes))))
+        length = math.exp(_corrected(tried, math.log(wanted)))
     assert best is not None
     return best
+
+
+def _corrected(tried: list[tuple[float, float]], wanted: float) -> float:
+    """The next length: along a power law through the last two tries, or a typical one."""
+    (last_length, last_nodes), power = tried[-1], -1.8
+    if len(tried) > 1 and tried[-2][0] != last_length:
+        power = (last_nodes - tried[-2][1]) / (last_length - tried[-2][0])
+        power = min(max(power, -3.0), -0.8)  # two runs differ by chance too
+    return last_length + (wanted - last_nodes) / power
 
 
 def _miss(mesh: Mesh, wanted: int) -> float:

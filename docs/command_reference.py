@@ -1,0 +1,83 @@
+"""Sphinx extension: appends the commands, their arguments and options to commands.md."""
+
+import inspect
+import re
+from pathlib import Path
+from typing import Any
+
+import typer
+from sphinx.application import Sphinx
+
+from palpate.cli import app
+
+
+def _commands(command: Any, path: str) -> list[tuple[str, Any]]:
+    """Every command that does something, with the words that call it, in the order of --help."""
+    if not hasattr(command, "commands"):
+        return [(path, command)]
+    return [
+        each
+        for name, part in command.commands.items()
+        for each in _commands(part, f"{path} {name}")
+    ]
+
+
+def _prose(text: str) -> str:
+    """A docstring in Markdown: its examples in one block."""
+    text = inspect.cleandoc(text)
+    examples = re.findall(r"^Example: (.*)$", text, re.MULTILINE)
+    prose = re.sub(r"\n*^Example: .*$", "", text, flags=re.MULTILINE)
+    prose = re.sub(r"--[a-z-]+", r"`\g<0>`", prose)
+    return f"{prose}\n\n```sh\n" + "\n".join(examples) + "\n```\n"
+
+
+def _usage(path: str, command: Any) -> str:
+    arguments = [each for each in command.params if each.param_type_name == "argument"]
+    words = []
+    for each in arguments:
+        name = each.metavar or each.name.upper()
+        words.append(name if each.required or name.startswith("[") else f"[{name}]")
+    return " ".join([path, "[OPTIONS]", *words])
+
+
+def _row(parameter: Any) -> str:
+    if parameter.param_type_name == "argument":
+        names = f"`{parameter.metavar or parameter.name.upper()}`"
+    else:
+        names = ", ".join(f"`{each}`" for each in [*parameter.opts, *parameter.secondary_opts])
+        if not parameter.is_flag:
+            names += f" {parameter.metavar or parameter.name.upper()}"
+    default = getattr(parameter.default, "value", parameter.default)  # of an enumeration
+    shown = f"`{default}`" if isinstance(default, (int, float, str, Path)) else ""
+    if isinstance(default, bool):
+        shown = ""
+    text = " ".join((parameter.help or "").split()).replace("|", "\\|")
+    text = re.sub(r"--[a-z-]+", r"`\g<0>`", text)
+    return f"| {names} | {text} | {shown} |"
+
+
+def reference() -> str:
+    """The commands in Markdown, a section each."""
+    parts = []
+    for path, command in _commands(typer.main.get_command(app), "palpate"):
+        rows = [_row(each) for each in command.params]
+        parts += [
+            f"## {path}\n",
+            f"```text\n{_usage(path, command)}\n```\n",
+            _prose(command.help),
+            "| argument, option | | default |\n| --- | --- | --- |",
+            *rows,
+            "",
+        ]
+    return "\n".join(parts)
+
+
+def _append(_app: Sphinx, page: str, source: list[str]) -> None:
+    if page == "commands":
+        source[0] += "\n" + reference()
+
+
+def setup(app: Sphinx) -> dict[str, bool]:
+    """Called by Sphinx."""
+    app.connect("source-read", _append)
+    return {"parallel_read_safe": True}
