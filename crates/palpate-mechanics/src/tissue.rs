@@ -22,6 +22,7 @@ mod kernel;
 pub(crate) mod law;
 mod matrix;
 mod polar;
+mod principal;
 mod projection;
 mod real;
 mod stiffness;
@@ -283,7 +284,8 @@ impl Tissue {
         self.gather(product);
     }
 
-    /// Adds the stiffness at positions `x` [m], that of each element made positive semi-definite.
+    /// Adds the stiffness at positions `x` [m], that of each element made positive semi-definite, with
+    /// the viscosity of a step that begins there.
     ///
     /// # Panics
     /// If the matrix has another pattern than [`Tissue::pattern`].

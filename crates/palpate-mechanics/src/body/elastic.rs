@@ -274,17 +274,17 @@ impl ElasticBody {
     }
 
     /// Arms of positions `x` about their centre, in their frame [m].
-    fn arms_of(&self, x: &[Point]) -> (DMat3, impl Iterator<Item = DVec3>) {
+    fn arms_of(&self, x: &[Point]) -> impl Iterator<Item = DVec3> {
         let positions = x.iter().map(|&x| DVec3::from_array(x));
         let (center, frame) = self.place_of(positions.clone());
         let to_frame = frame.transpose();
-        (frame, positions.map(move |x| to_frame * (x - center)))
+        positions.map(move |x| to_frame * (x - center))
     }
 
     /// Elastic energy [J] at positions `x`.
     pub(crate) fn elastic_energy(&mut self, x: &[Point]) -> f64 {
         let strain: Vec<[f64; 3]> =
-            self.arms_of(x).1.zip(&self.rest).map(|(arm, &rest)| (arm - rest).to_array()).collect();
+            self.arms_of(x).zip(&self.rest).map(|(arm, &rest)| (arm - rest).to_array()).collect();
         let stiffness = match &mut self.elasticity {
             Elasticity::Linear(stiffness) => stiffness,
             Elasticity::Nonlinear(method) => return method.tissue.energy(x),

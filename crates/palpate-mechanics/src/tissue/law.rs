@@ -8,6 +8,7 @@ mod saint_venant_kirchhoff;
 pub(super) mod viscosity;
 
 use super::matrix::Matrix;
+use super::principal::PrincipalTangent;
 use super::real::Real;
 
 pub(super) use corotated::Corotated;
@@ -127,6 +128,26 @@ pub(super) trait ElementLaw: Copy {
 
     /// First Piola-Kirchhoff stress [Pa]: the derivative of the energy.
     fn stress<R: Real>(&self, f: &Matrix<R>, directions: &Directions<R>) -> Matrix<R>;
+
+    /// Derivative of the stress, without fibres, at principal stretches.
+    fn principal_tangent<R: Real>(&self, stretches: &[R; 3]) -> PrincipalTangent<R>;
+
+    /// What a family of fibres adds to the derivative of the stress.
+    fn fibre_tangent<R: Real>(&self, _f: &Matrix<R>, _direction: &[R; 3]) -> FibreTangent<R> {
+        unreachable!("a law without fibres")
+    }
+}
+
+/// Derivative of the stress of fibres `dW = c e', e' = 2 M : F'`, `M = kappa F + (1 - 3 kappa) F a aᵀ`:
+/// positive semi-definite, because the energy is convex in F.
+pub(super) struct FibreTangent<R> {
+    /// `c kappa` and `c (1 - 3 kappa)`.
+    pub(super) dispersed: R,
+    pub(super) aligned: R,
+    /// M
+    pub(super) normal: Matrix<R>,
+    /// `2 dc/de`
+    pub(super) steepness: R,
 }
 
 /// Runs `$body` with `$law` bound to the concrete law.

@@ -1,9 +1,6 @@
-//! Nearest positive semi-definite matrix of a symmetric 9x9 one, in all lanes at once.
+//! Nearest positive semi-definite matrix of a small symmetric one, in all lanes at once.
 
 use super::real::{Real, positive_part};
-
-pub(super) const SIZE: usize = 9;
-pub(super) type Tangent<R> = [[R; SIZE]; SIZE];
 
 /// Cyclic Jacobi sweeps. What they leave beside the diagonal only tilts the projection a little: the
 /// result is positive semi-definite whatever they leave.
@@ -11,7 +8,7 @@ const SWEEPS: usize = 6;
 
 /// 1 where `matrix` is positive semi-definite to round-off, else 0: the signs of the pivots.
 #[inline(always)]
-pub(super) fn is_semidefinite<R: Real>(matrix: &Tangent<R>) -> R {
+pub(super) fn is_semidefinite<R: Real, const SIZE: usize>(matrix: &[[R; SIZE]; SIZE]) -> R {
     let like = matrix[0][0];
     let (zero, one) = (like.splat(0.0), like.splat(1.0));
     let mut size = zero;
@@ -37,7 +34,9 @@ pub(super) fn is_semidefinite<R: Real>(matrix: &Tangent<R>) -> R {
 
 /// The matrix without its negative eigenvalues.
 #[inline(always)]
-pub(super) fn without_negative<R: Real>(matrix: &Tangent<R>) -> Tangent<R> {
+pub(super) fn without_negative<R: Real, const SIZE: usize>(
+    matrix: &[[R; SIZE]; SIZE],
+) -> [[R; SIZE]; SIZE] {
     let like = matrix[0][0];
     let (zero, one) = (like.splat(0.0), like.splat(1.0));
     let mut diagonal = *matrix;
@@ -75,7 +74,13 @@ pub(super) fn without_negative<R: Real>(matrix: &Tangent<R>) -> Tangent<R> {
 
 /// Turns rows p and q.
 #[inline(always)]
-fn turn<R: Real>(matrix: &mut Tangent<R>, p: usize, q: usize, c: R, s: R) {
+fn turn<R: Real, const SIZE: usize>(
+    matrix: &mut [[R; SIZE]; SIZE],
+    p: usize,
+    q: usize,
+    c: R,
+    s: R,
+) {
     for col in 0..SIZE {
         let (a, b) = (matrix[p][col], matrix[q][col]);
         matrix[p][col] = c * a - s * b;
@@ -85,7 +90,7 @@ fn turn<R: Real>(matrix: &mut Tangent<R>, p: usize, q: usize, c: R, s: R) {
 
 /// Cosine and sine of the rotation that makes the entry beside the diagonal zero.
 #[inline(always)]
-fn rotation<R: Real>(pp: R, qq: R, pq: R) -> (R, R) {
+pub(super) fn rotation<R: Real>(pp: R, qq: R, pq: R) -> (R, R) {
     let (zero, one) = (pp.splat(0.0), pp.splat(1.0));
     let tiny = pp.splat(f64::MIN_POSITIVE);
     let difference = qq - pp;

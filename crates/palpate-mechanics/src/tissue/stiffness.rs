@@ -6,8 +6,8 @@ use pulp::Simd;
 use super::group::Group;
 use super::kernel::{Elements, Task};
 use super::law::ElementLaw;
-use super::matrix;
-use super::projection::{SIZE, Tangent, is_semidefinite, without_negative};
+use super::matrix::{self, Matrix};
+use super::principal::{PrincipalTangent, axes};
 use super::real::Real;
 use super::wide::{Eight, LANES, Wide};
 
@@ -37,24 +37,27 @@ pub(super) struct Stiffness<'a> {
 impl Task for Stiffness<'_> {
     #[inline(always)]
     fn elements<S: Simd, L: ElementLaw>(&mut self, law: &L, elements: &Elements<S>) {
-        let tangent = tangent(law, elements, self.lambda);
-        let gradients = gradients(elements);
-        for pair in 0..10 {
-            let [row, col] = PAIRS[pair];
-            for a in 0..3 {
-                // Stress along a on this corner's gradient, per entry of the deformation gradient.
-                let mut stress = [elements.volume; SIZE];
-                for entry in 0..SIZE {
-                    stress[entry] = elements.volume
-                        * (gradients[row][0] * tangent[3 * a][entry]
-                            + gradients[row][1] * tangent[3 * a + 1][entry]
-                            + gradients[row][2] * tangent[3 * a + 2][entry]);
+        let blocks = inner_blocks(law, elements, self.lambda);
+        // The first corner's from the others': moving all corners together costs nothing.
+        let mut beside_first = [blocks[0]; 3];
+        for row in 0..3 {
+            let mut sum = blocks[inner_pair(row, row)];
+            for col in 0..3 {
+                if col != row {
+                    sum = matrix::add(&sum, &between(&blocks, row, col));
                 }
-                for b in 0..3 {
-                    let value = gradients[col][0] * stress[3 * b]
-                        + gradients[col][1] * stress[3 * b + 1]
-                        + gradients[col][2] * stress[3 * b + 2];
-                    value.store(&mut self.values[pair][a][b], elements.part);
+            }
+            beside_first[row] = matrix::scale(elements.volume.splat(-1.0), &sum);
+        }
+        let [b, c, d] = beside_first;
+        let sum = matrix::add(&matrix::add(&b, &c), &d);
+        let first = matrix::scale(elements.volume.splat(-1.0), &sum);
+        let [bb, cb, cc, db, dc, dd] = blocks;
+        for (values, block) in self.values.iter_mut().zip([first, b, bb, c, cb, cc, d, db, dc, dd])
+        {
+            for row in 0..3 {
+                for col in 0..3 {
+                    block[row][col].store(&mut values[row][col], elements.part);
                 }
             }
         }
@@ -79,53 +82,88 @@ impl Task for Stiffness<'_> {
     }
 }
 
-/// Derivative of the stress by the deformation gradient, entry `3 a + k` for row a, column k; where it
-/// is not positive semi-definite, the nearest matrix that is.
+/// Pairs of the last three corners.
+const INNER_PAIRS: [[usize; 2]; 6] = [[0, 0], [1, 0], [1, 1], [2, 0], [2, 1], [2, 2]];
+
+/// Where the pair of corners `row >= col` is among them.
 #[inline(always)]
-fn tangent<S: Simd, L: ElementLaw>(
+const fn inner_pair(row: usize, col: usize) -> usize {
+    row * (row + 1) / 2 + col
+}
+
+#[inline(always)]
+fn between<R: Real>(blocks: &[Matrix<R>; 6], row: usize, col: usize) -> Matrix<R> {
+    if row > col {
+        blocks[inner_pair(row, col)]
+    } else {
+        matrix::transpose(&blocks[inner_pair(col, row)])
+    }
+}
+
+/// Stiffness between the last three corners. The isotropic part of the tangent is made positive
+/// semi-definite; fibres, and viscosity where a step begins, are so by themselves.
+#[inline(always)]
+fn inner_blocks<S: Simd, L: ElementLaw>(
     law: &L,
     elements: &Elements<S>,
     lambda: f64,
-) -> Tangent<Wide<S>> {
-    let (zero, one) = (elements.volume.splat(0.0), elements.volume.splat(1.0));
-    let mut raw = [[zero; SIZE]; SIZE];
-    for entry in 0..SIZE {
-        let mut slope = matrix::zero(zero);
-        slope[entry / 3][entry % 3] = one;
-        let change = elements.stress_slope(law, &slope, lambda, zero);
-        for row in 0..SIZE {
-            raw[row][entry] = change[row / 3][row % 3];
+) -> [Matrix<Wide<S>>; 6] {
+    let (zero, volume) = (elements.volume.splat(0.0), elements.volume);
+    let f = &elements.f;
+    let (u, stretches, v) = axes(f);
+    let mut tangent = law.principal_tangent(&stretches);
+    if let Some(pressure) = elements.pressure {
+        let of_volume = PrincipalTangent::of_volume(&stretches, pressure, zero.splat(lambda));
+        tangent = tangent.add(&of_volume);
+    }
+    let tangent = tangent.without_negative(|keep: Wide<S>| {
+        let mut lanes = [1.0; LANES];
+        keep.store(&mut lanes, 0);
+        lanes.iter().all(|&keep| keep == 1.0)
+    });
+    let gradients = &elements.inverse;
+    let along = matrix::multiply(gradients, &v);
+    let mut blocks = [matrix::zero(zero); 6];
+    for pair in 0..6 {
+        let [row, col] = INNER_PAIRS[pair];
+        let block = tangent.block(&along[row], &along[col]);
+        let block = matrix::multiply(&matrix::multiply(&u, &block), &matrix::transpose(&u));
+        blocks[pair] = matrix::scale(volume, &block);
+    }
+    if let Some((viscosity, _)) = &elements.viscosity {
+        let square = matrix::multiply(f, &matrix::transpose(f));
+        // Row by row F times a shape gradient.
+        let turned = matrix::multiply(gradients, &matrix::transpose(f));
+        for pair in 0..6 {
+            let [row, col] = INNER_PAIRS[pair];
+            let product = inner(&gradients[row], &gradients[col]);
+            let block = viscosity.block(&turned[row], &turned[col], product, &square);
+            blocks[pair] = matrix::add(&blocks[pair], &matrix::scale(volume, &block));
         }
     }
-    let half = one.splat(0.5);
-    let mut symmetric = raw;
-    for row in 0..SIZE {
-        for col in 0..SIZE {
-            symmetric[row][col] = half * (raw[row][col] + raw[col][row]);
+    for family in 0..L::FAMILIES {
+        let direction = &elements.directions[family];
+        let fibres = law.fibre_tangent(f, direction);
+        let turned = matrix::multiply(gradients, &matrix::transpose(&fibres.normal));
+        for pair in 0..6 {
+            let [row, col] = INNER_PAIRS[pair];
+            let aligned = inner(&gradients[row], direction) * inner(&gradients[col], direction);
+            let product = inner(&gradients[row], &gradients[col]);
+            let along = volume * (fibres.dispersed * product + fibres.aligned * aligned);
+            let steepness = volume * fibres.steepness;
+            for a in 0..3 {
+                for b in 0..3 {
+                    blocks[pair][a][b] =
+                        blocks[pair][a][b] + steepness * turned[row][a] * turned[col][b];
+                }
+                blocks[pair][a][a] = blocks[pair][a][a] + along;
+            }
         }
     }
-    let keep = is_semidefinite(&symmetric);
-    let mut lanes = [1.0; LANES];
-    keep.store(&mut lanes, 0);
-    if lanes.iter().all(|&keep| keep == 1.0) {
-        return symmetric;
-    }
-    let projected = without_negative(&symmetric);
-    for row in 0..SIZE {
-        for col in 0..SIZE {
-            symmetric[row][col] = keep.if_greater(half, symmetric[row][col], projected[row][col]);
-        }
-    }
-    symmetric
+    blocks
 }
 
-/// Shape gradients of the four corners [1/m].
 #[inline(always)]
-fn gradients<S: Simd>(elements: &Elements<S>) -> [[Wide<S>; 3]; 4] {
-    let [b, c, d] = elements.inverse;
-    let mut first = b;
-    for axis in 0..3 {
-        first[axis] = -(b[axis] + c[axis] + d[axis]);
-    }
-    [first, b, c, d]
+fn inner<R: Real>(a: &[R; 3], b: &[R; 3]) -> R {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }

@@ -5,5 +5,6 @@ mod body;
 mod closed_forms;
 mod laws;
 mod rotation;
+mod stiffness;
 mod support;
 mod twin;

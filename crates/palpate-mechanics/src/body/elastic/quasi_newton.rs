@@ -6,7 +6,7 @@
 
 use std::sync::Arc;
 
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 use palpate_geometry::Point;
 use palpate_model::Body;
 use palpate_solver::BlockMatrix;
@@ -97,33 +97,19 @@ impl QuasiNewton {
         inertia: f64,
         time_step: f64,
     ) -> &BlockMatrix {
-        for (x, rest) in self.x.iter_mut().zip(rest) {
-            *x = rest.to_array();
-        }
         self.stiff_arms.clear();
         self.stiff_arms.extend_from_slice(rest);
-        self.system_at_trial(DMat3::IDENTITY, masses, inertia, time_step)
+        self.system_of_arms(masses, inertia, time_step)
     }
 
-    /// A at the trial positions, whose frame is `frame`.
-    fn system_at_trial(
-        &mut self,
-        frame: DMat3,
-        masses: &[f64],
-        inertia: f64,
-        time_step: f64,
-    ) -> &BlockMatrix {
+    /// A of the shape that the arms give, in its frame.
+    fn system_of_arms(&mut self, masses: &[f64], inertia: f64, time_step: f64) -> &BlockMatrix {
+        for (x, arm) in self.x.iter_mut().zip(&self.stiff_arms) {
+            *x = arm.to_array();
+        }
         self.tissue.begin_step(&self.x, time_step);
         self.stiffness.blocks_mut().fill([[0.0; 3]; 3]);
         self.tissue.add_stiffness(&self.x, &mut self.stiffness);
-        if frame != DMat3::IDENTITY {
-            let to_frame = frame.transpose();
-            for block in self.stiffness.blocks_mut() {
-                // Row by row here, column by column there.
-                let turned = to_frame * DMat3::from_cols_array_2d(block).transpose() * frame;
-                *block = turned.transpose().to_cols_array_2d();
-            }
-        }
         self.system.fill(&self.stiffness, masses, inertia, 1.0)
     }
 }
@@ -165,7 +151,7 @@ impl ElasticBody {
 
     /// Whether positions `x` differ much in shape from those that A is made of.
     fn is_deformed(&self, method: &QuasiNewton, x: &[Point]) -> bool {
-        largest_change(self.arms_of(x).1, &method.stiff_arms) > DEFORMED
+        largest_change(self.arms_of(x), &method.stiff_arms) > DEFORMED
     }
 
     /// Makes A of the stiffness at `shape`, or of that at rest if it is empty; true if A has changed.
@@ -178,11 +164,9 @@ impl ElasticBody {
         method.stiff_shape.clear();
         let (inertia, time_step) = (self.inertia(), self.time_step);
         if !shape.is_empty() {
-            method.x.copy_from_slice(shape);
-            let (frame, arms) = self.arms_of(shape);
             method.stiff_arms.clear();
-            method.stiff_arms.extend(arms);
-            let system = method.system_at_trial(frame, &self.masses, inertia, time_step);
+            method.stiff_arms.extend(self.arms_of(shape));
+            let system = method.system_of_arms(&self.masses, inertia, time_step);
             if self.factor.refactor(system).is_ok() {
                 method.stiff_shape.extend_from_slice(shape);
                 return true;

@@ -6,6 +6,7 @@
 //! resistance to change of volume is that of small strain: it does not grow as the volume goes to 0.
 
 use super::super::matrix::{self, Matrix};
+use super::super::principal::{OTHERS, PrincipalTangent};
 use super::super::real::Real;
 use super::{Directions, ElementLaw, Lame};
 
@@ -41,5 +42,25 @@ impl ElementLaw for Corotated {
         let trace = matrix::dot(&rotation, f) - like.splat(3.0);
         let along_rotation = like.splat(self.lame.lambda) * trace - two_mu;
         matrix::add(&matrix::scale(two_mu, f), &matrix::scale(along_rotation, &rotation))
+    }
+
+    #[inline(always)]
+    fn principal_tangent<R: Real>(&self, stretches: &[R; 3]) -> PrincipalTangent<R> {
+        let like = stretches[0];
+        let (two, floor) = (like.splat(2.0), like.splat(1e-9));
+        let (two_mu, lambda) = (like.splat(2.0 * self.lame.mu), like.splat(self.lame.lambda));
+        let strain = stretches[0] + stretches[1] + stretches[2] - like.splat(3.0);
+        let mut result = PrincipalTangent {
+            stretching: matrix::add_diagonal(&[[lambda; 3]; 3], two_mu),
+            twist: [two_mu; 3],
+            flip: [two_mu; 3],
+        };
+        for k in 0..3 {
+            let [i, j] = OTHERS[k];
+            let sum = stretches[i] + stretches[j];
+            let stress = two_mu * (sum - two) + two * lambda * strain;
+            result.twist[k] = stress / sum.if_greater(floor, sum, floor);
+        }
+        result
     }
 }

@@ -8,9 +8,11 @@
 //! compressible tissue. Above an exponent of [`LARGEST_EXPONENT`] the exponential goes on along its
 //! tangent: forces stay finite and the energy convex in e.
 
+use super::super::dual::Dual;
 use super::super::matrix::{self, Matrix};
+use super::super::principal::PrincipalTangent;
 use super::super::real::{Real, positive_part};
-use super::{Directions, ElementLaw, FibreParameters, Lame, NeoHookean};
+use super::{Directions, ElementLaw, FibreParameters, FibreTangent, Lame, NeoHookean};
 
 /// e^40 = 2e17: far beyond what any fibre survives.
 const LARGEST_EXPONENT: f64 = 40.0;
@@ -81,5 +83,34 @@ impl<const COUNT: usize> ElementLaw for HolzapfelGasserOgden<COUNT> {
             }
         }
         sum
+    }
+
+    #[inline(always)]
+    fn principal_tangent<R: Real>(&self, stretches: &[R; 3]) -> PrincipalTangent<R> {
+        self.matrix.principal_tangent(stretches)
+    }
+
+    #[inline(always)]
+    fn fibre_tangent<R: Real>(&self, f: &Matrix<R>, direction: &[R; 3]) -> FibreTangent<R> {
+        let kappa = self.fibres.kappa;
+        let (strain, turned) = self.strain(f, direction);
+        let strain = Dual { value: strain, slope: strain.splat(1.0) };
+        let (exponent, _) = self.exponent(strain);
+        let slope = strain.splat(2.0 * self.fibres.k1) * strain * exponent.exp();
+        let zero = strain.value.splat(0.0);
+        let steepness = strain.value.if_greater(zero, slope.slope + slope.slope, zero);
+        let (dispersed, aligned) = (zero.splat(kappa), zero.splat(1.0 - 3.0 * kappa));
+        let mut normal = matrix::scale(dispersed, f);
+        for row in 0..3 {
+            for col in 0..3 {
+                normal[row][col] = normal[row][col] + aligned * turned[row] * direction[col];
+            }
+        }
+        FibreTangent {
+            dispersed: slope.value * dispersed,
+            aligned: slope.value * aligned,
+            normal,
+            steepness,
+        }
     }
 }

@@ -8,6 +8,7 @@
 //! Kim (2018) do for neo-Hookean: finite for every F, and polyconvex for c10, c01, l >= 0.
 
 use super::super::matrix::{self, Matrix};
+use super::super::principal::{OTHERS, PrincipalTangent};
 use super::super::real::Real;
 use super::{Directions, ElementLaw};
 
@@ -54,5 +55,28 @@ impl ElementLaw for MooneyRivlin {
         let along_cofactor = like.splat(self.bulk) * change - like.splat(self.rest_pressure());
         let second = matrix::add_diagonal(&matrix::scale(-two_c01, &square), along_f);
         matrix::add(&matrix::multiply(f, &second), &matrix::scale(along_cofactor, &cofactor))
+    }
+
+    #[inline(always)]
+    fn principal_tangent<R: Real>(&self, stretches: &[R; 3]) -> PrincipalTangent<R> {
+        let like = stretches[0];
+        let (two_c10, two_c01) = (like.splat(2.0 * self.c10), like.splat(2.0 * self.c01));
+        let bulk = like.splat(self.bulk);
+        let volume = stretches[0] * stretches[1] * stretches[2];
+        let slope = bulk * (volume - like.splat(1.0)) - like.splat(self.rest_pressure());
+        let mut result = PrincipalTangent::of_volume(stretches, slope, bulk);
+        for k in 0..3 {
+            let [i, j] = OTHERS[k];
+            let product = stretches[i] * stretches[j];
+            let squares = stretches[i] * stretches[i] + stretches[j] * stretches[j];
+            let square = stretches[k] * stretches[k];
+            let cross = two_c01 * (product + product);
+            result.stretching[k][k] = result.stretching[k][k] + two_c10 + two_c01 * squares;
+            result.stretching[i][j] = result.stretching[i][j] + cross;
+            result.stretching[j][i] = result.stretching[j][i] + cross;
+            result.twist[k] = result.twist[k] + two_c10 + two_c01 * (square + product);
+            result.flip[k] = result.flip[k] + two_c10 + two_c01 * (square - product);
+        }
+        result
     }
 }

@@ -8,6 +8,7 @@
 //! is zero at rest and lambda may be zero. Finite for every F; an inverted element is pushed back.
 
 use super::super::matrix::{self, Matrix};
+use super::super::principal::PrincipalTangent;
 use super::super::real::Real;
 use super::{Directions, ElementLaw, Lame};
 
@@ -46,5 +47,27 @@ impl ElementLaw for NeoHookean {
         let along_f = shear - shear / (matrix::dot(f, f) + one);
         let along_cofactor = like.splat(self.bulk) * change - like.splat(0.75 * self.shear);
         matrix::add(&matrix::scale(along_f, f), &matrix::scale(along_cofactor, &cofactor))
+    }
+
+    #[inline(always)]
+    fn principal_tangent<R: Real>(&self, stretches: &[R; 3]) -> PrincipalTangent<R> {
+        let [a, b, c] = *stretches;
+        let (one, shear) = (a.splat(1.0), a.splat(self.shear));
+        let bulk = a.splat(self.bulk);
+        let inverse = one / (a * a + b * b + c * c + one);
+        let slope = bulk * (a * b * c - one) - a.splat(0.75 * self.shear);
+        let along_f = shear - shear * inverse;
+        let curvature = (shear + shear) * inverse * inverse;
+        let mut result = PrincipalTangent::of_volume(stretches, slope, bulk);
+        for k in 0..3 {
+            result.twist[k] = result.twist[k] + along_f;
+            result.flip[k] = result.flip[k] + along_f;
+            for i in 0..3 {
+                result.stretching[k][i] =
+                    result.stretching[k][i] + curvature * stretches[k] * stretches[i];
+            }
+            result.stretching[k][k] = result.stretching[k][k] + along_f;
+        }
+        result
     }
 }

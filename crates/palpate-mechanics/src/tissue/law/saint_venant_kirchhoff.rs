@@ -5,6 +5,7 @@
 //! 1/√3 and is zero for a flat element, so that it collapses and inverts. Use it in tension.
 
 use super::super::matrix::{self, Matrix};
+use super::super::principal::{OTHERS, PrincipalTangent};
 use super::super::real::Real;
 use super::{Directions, ElementLaw, Lame};
 
@@ -46,5 +47,26 @@ impl ElementLaw for SaintVenantKirchhoff {
         let pressure = like.splat(self.lame.lambda) * matrix::trace(&strain);
         let stress = matrix::scale(like.splat(2.0 * self.lame.mu), &strain);
         matrix::multiply(f, &matrix::add_diagonal(&stress, pressure))
+    }
+
+    #[inline(always)]
+    fn principal_tangent<R: Real>(&self, stretches: &[R; 3]) -> PrincipalTangent<R> {
+        let [a, b, c] = *stretches;
+        let (mu, lambda) = (a.splat(self.lame.mu), a.splat(self.lame.lambda));
+        let trace = a.splat(0.5) * (a * a + b * b + c * c - a.splat(3.0));
+        let rest = lambda * trace - mu;
+        let mut result =
+            PrincipalTangent { stretching: matrix::zero(mu), twist: [rest; 3], flip: [rest; 3] };
+        for k in 0..3 {
+            let [i, j] = OTHERS[k];
+            let (square, product) = (stretches[k] * stretches[k], stretches[i] * stretches[j]);
+            let squares = stretches[i] * stretches[i] + stretches[j] * stretches[j];
+            result.stretching[k][k] = rest + (mu + mu + mu + lambda) * square;
+            result.stretching[i][j] = lambda * product;
+            result.stretching[j][i] = result.stretching[i][j];
+            result.twist[k] = rest + mu * (squares - product);
+            result.flip[k] = rest + mu * (squares + product);
+        }
+        result
     }
 }

@@ -66,6 +66,27 @@ impl Viscosity {
         }
         matrix::multiply(f, &matrix::add_diagonal(&stress, pressure))
     }
+
+    /// Stiffness between two nodes, where the step begins, by what F makes of their shape gradients,
+    /// the product of these, and `F Fᵀ`.
+    #[inline(always)]
+    pub(in super::super) fn block<R: Real>(
+        &self,
+        a: &[R; 3],
+        b: &[R; 3],
+        product: R,
+        square: &Matrix<R>,
+    ) -> Matrix<R> {
+        let (mu, lambda) = (product.splat(self.lame.mu), product.splat(self.lame.lambda));
+        let mut result = matrix::scale(mu * product, square);
+        for row in 0..3 {
+            for col in 0..3 {
+                result[row][col] =
+                    result[row][col] + lambda * a[row] * b[col] + mu * b[row] * a[col];
+            }
+        }
+        result
+    }
 }
 
 #[inline(always)]
