@@ -9,7 +9,7 @@ SOURCES := pyproject.toml Cargo.toml Cargo.lock $(shell find crates -name '*.rs'
 CRATES := --workspace --exclude palpate-python
 
 .DEFAULT_GOAL := help
-.PHONY: help install run test test-rust test-python soak lint format bench docs wheel models clean
+.PHONY: help install run test test-rust test-python soak lint format bench docs wheel models three clean
 
 help: ## Show this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /\1\t/' | expand -t 14
@@ -72,6 +72,14 @@ wheel: $(BIN)/maturin ## Build a wheel for any Python from 3.10 on, and try it i
 
 models: install ## Make the example organs again
 	$(BIN)/python python/palpate/models/make_models.py
+
+three: ## Make the viewer's copy of three.js again (needs npm)
+	npm install --no-save --prefix target/three three@0.187.0 esbuild@0.28.2
+	cp python/palpate/viewer/three.entry.js target/three/
+	cd target/three && npx esbuild three.entry.js --bundle --minify --format=esm \
+		--legal-comments=inline --outfile=three.module.min.js
+	cp target/three/three.module.min.js python/palpate/viewer/page/
+	cp target/three/node_modules/three/LICENSE python/palpate/viewer/page/three.LICENSE
 
 clean: ## Remove everything that was built
 	rm -rf target $(VENV) out dist docs/_build

@@ -423,6 +423,19 @@ def test_one_may_step_it_oneself():
         assert read(page, "frame")[0]["time"] == pytest.approx(0.05)
 
 
+def test_a_fault_of_ours_is_shown(make_box, capsys):
+    class Faulty(LivePlayer):
+        def advance(self):
+            raise RuntimeError("a bug")
+
+    player = Faulty(palpate.Simulation([make_box((1, 1, 1))]))
+    with Viewer(lambda: player, port=0) as viewer, talk(viewer) as page:
+        assert "a bug" in read(page, "problem")[0]["text"]
+        page.send(json.dumps({"type": "show", "field": None, "contacts": True, "touching": True}))
+        read(page, "frame")
+    assert "a bug" in capsys.readouterr().err
+
+
 # --- the server
 
 

@@ -81,7 +81,7 @@ def place_on_screen(page, body):
 
 def test_bodies_are_seen_and_move_until_paused(page, tmp_path):
     page.key("r")
-    page.wait("palpate.last.header.time === 0")
+    page.wait("palpate.last.header.time === 0 && !palpate.stage.dirty")
     before = picture(page, tmp_path / "before.png")
     # Red, yellow and blue: the colours of the model.
     middle = before[60:-60, 100:-100]

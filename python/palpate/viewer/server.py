@@ -10,6 +10,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import itertools
+import logging
 import threading
 from http import HTTPStatus
 from typing import TYPE_CHECKING
@@ -33,6 +34,9 @@ _MAX_COMMAND = 1 << 20
 _IN_FLIGHT = 2
 #: Messages beside frames that wait for a page at most; one that reads none is cut off.
 _BACKLOG = 256
+#: What strangers send to the port is no news for a terminal.
+_LOG = logging.getLogger("palpate.viewer.server")
+_LOG.addHandler(logging.NullHandler())
 _LOOPBACK = ("127.0.0.1", "localhost", "::1")
 
 
@@ -126,6 +130,7 @@ class Server:
             compression=None,  # positions do not compress, and it would cost the solver's core
             max_size=_MAX_COMMAND,
             close_timeout=1,
+            logger=_LOG,
         )
         return server
 

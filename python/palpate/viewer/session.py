@@ -149,9 +149,15 @@ class Session:
                     self._wake.wait(_LOOK if self._player is None else wait)
                 if self._stopping:
                     return
-            if self._player is None and self._changed_file() != self._seen:
-                self.open()
-            wait = self.pump()
+            try:
+                if self._player is None and self._changed_file() != self._seen:
+                    self.open()
+                wait = self.pump()
+            except Exception as error:  # a fault of ours must not leave a page that hangs
+                traceback.print_exc()
+                self._stop_playing()
+                self._problem("The viewer has a fault", error)
+                wait = None
 
     def _changed_file(self) -> int | None:
         """When the watched file was written."""

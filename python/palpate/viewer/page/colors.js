@@ -29,10 +29,11 @@ export function rampIndex(value) {
   return 3 * Math.round(Math.min(1, Math.max(0, value)) * (STEPS - 1));
 }
 
+/** `least`: the smallest end of the legend, so that noise is not painted; of lengths, by the scene's. */
 export const FIELDS = {
-  displacement: { name: "Displacement", unit: "m" },
-  deformation: { name: "Deformation", unit: "m", note: "off the best rigid motion" },
-  strain: { name: "Strain", unit: "", note: "equivalent strain, the mean around each node" },
-  depth: { name: "Penetration depth", unit: "m" },
-  force: { name: "Contact force", unit: "N" },
+  displacement: { name: "Displacement", unit: "m", least: 1e-4 },
+  deformation: { name: "Deformation", unit: "m", least: 1e-4, note: "off the best rigid motion" },
+  strain: { name: "Strain", unit: "", least: 1e-3, note: "equivalent strain, the mean around each node" },
+  depth: { name: "Penetration depth", unit: "m", least: 1e-5 },
+  force: { name: "Contact force", unit: "N", least: 1e-6 },
 };

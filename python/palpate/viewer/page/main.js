@@ -1,5 +1,6 @@
 // Puts the page together: messages come in, the stage and the panel follow, commands go out.
 
+import { FIELDS } from "palpate/colors";
 import { Connection } from "palpate/connection";
 import { Transport } from "palpate/controls";
 import { Overlay } from "palpate/overlay";
@@ -30,7 +31,9 @@ class App {
     this.pointer = new Pointer(this.stage, this);
     for (const button of find("modes").children) button.onclick = () => this.setMode(button.dataset.mode);
     find("panel_toggle").onclick = () => this.togglePanel();
-    find("problem").querySelector("button").onclick = () => this.send({ type: "reload" });
+    const [again, look] = find("problem").querySelectorAll("button");
+    again.onclick = () => this.send({ type: "reload" });
+    look.onclick = () => (find("problem").hidden = true);
     addEventListener("keydown", (event) => this.key(event));
     if (innerWidth < 900) document.body.classList.add("bare");
     this.setMode("look");
@@ -87,6 +90,7 @@ class App {
     const names = header.bodies.map((body) => body.name).join("/");
     this.stage.setScene(message, this.haveScene && names.startsWith(this.names ?? "/"));
     this.names = names;
+    this.unframed ||= !this.haveScene;
     this.haveScene = true;
     this.high = 0;
     this.panel.scene();
@@ -101,6 +105,10 @@ class App {
     this.positions = positions;
     this.last = message;
     this.stage.move(positions);
+    // At the start, and back at the start, as long as the user has left the camera alone.
+    if (this.unframed || (header.time < this.time && !this.stage.cameraMoved)) this.stage.frameCamera();
+    this.unframed = false;
+    this.time = header.time;
     this.overlay.update(message, positions, this.view);
     this.paint(header, arrays, positions);
     this.transport.moment(header);
@@ -138,8 +146,8 @@ class App {
       for (let i = body.start; i < body.start + body.nodeCount; i++) most = Math.max(most, values[i]);
     }
     // The range grows at once and shrinks slowly, so that colours do not flicker.
-    this.high = Math.max(most, 0.985 * this.high);
-    for (const body of this.stage.bodies) body.paint(body.look.rigid ? null : values, this.high || 1);
+    this.high = Math.max(most, 0.985 * this.high, FIELDS[field].least * (FIELDS[field].unit === "m" ? this.stage.size : 1));
+    for (const body of this.stage.bodies) body.paint(body.look.rigid ? null : values, this.high);
     showLegend(find("legend"), field, this.high);
   }
 
@@ -195,6 +203,7 @@ class App {
   problem({ title, text }) {
     this.loading(null);
     find("problem").hidden = false;
+    find("problem").querySelector('[data-action="look"]').hidden = !this.haveScene;
     find("problem").querySelector("h2").textContent = title;
     find("problem").querySelector("pre").textContent = text;
   }
@@ -251,11 +260,16 @@ class App {
     this.send({ type: "reset" });
   }
 
+  help() {
+    find("help").showModal();
+  }
+
   togglePanel() {
     document.body.classList.toggle("bare");
   }
 
   key(event) {
+    if (find("help").open) return;
     if (event.ctrlKey || event.metaKey || event.altKey) return;
     if (event.target.closest?.("input:not([type=checkbox]):not([type=range]), select")) return;
     const toggles = { c: "contacts", t: "touching", w: "wireframe", b: "boxes", g: "grid" };
@@ -263,7 +277,7 @@ class App {
     const modes = { 1: "look", 2: "pull", 3: "push", 4: "cut" };
     const actions = {
       " ": () => this.togglePlay(), arrowright: () => this.step(), r: () => this.reset(), f: () => this.stage.frameCamera(),
-      z: () => this.can("cut") && this.send({ type: "undo" }), p: () => this.togglePanel(), escape: () => this.pointer.cancel(),
+      z: () => this.can("cut") && this.send({ type: "undo" }), p: () => this.togglePanel(), escape: () => this.pointer.cancel(), "?": () => this.help(),
     };
     if (toggles[key]) this.set({ [toggles[key]]: !this.view[toggles[key]] });
     else if (modes[key]) {

@@ -26,6 +26,7 @@ export class Stage {
     this.controls = new OrbitControls(this.camera, this.canvas);
     Object.assign(this.controls, { enableDamping: true, dampingFactor: 0.15, maxDistance: 30, minDistance: 0.15 });
     this.controls.addEventListener("change", () => this.touch());
+    this.controls.addEventListener("start", () => (this.cameraMoved = true));
     this.world = new Group();
     this.scene.add(this.world);
     this.bodies = [];
@@ -129,9 +130,10 @@ export class Stage {
       }
     }
     if (!(low.x <= high.x)) return;
+    this.cameraMoved = false;
     const half = Math.tan((this.camera.fov * Math.PI) / 360);
     const reach = Math.max(0.3, high.distanceTo(low) / 2);
-    const distance = (0.98 * reach) / (half * Math.min(1, this.camera.aspect));
+    const distance = (1.05 * reach) / (half * Math.min(1, this.camera.aspect));
     this.controls.target.copy(low).add(high).multiplyScalar(0.5);
     this.camera.position.set(0.48, 0.5, 1).normalize().multiplyScalar(distance).add(this.controls.target);
     this.controls.update();
