@@ -24,6 +24,7 @@ def main(folder: Path) -> None:
             ["python", "-m", "pip", "install", "--quiet", str(wheel.resolve())],
             ["palpate", "--version"],
             ["palpate", "simulate", "small", "--duration", "0.25", "--output", "out"],
+            ["palpate", "view", "out", "--export", "film.html"],
         ):
             subprocess.run(
                 [binaries / command[0], *command[1:]], cwd=place, env=environment, check=True
