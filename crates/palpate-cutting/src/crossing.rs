@@ -203,6 +203,14 @@ impl<'a> Sides<'a> {
         self.found[node as usize].expect("asked for before")
     }
 
+    /// The unit normal of the sheet where it is closest to a node that was asked for before.
+    ///
+    /// # Panics
+    /// If it was not.
+    pub(crate) fn normal(&self, node: u32) -> Point {
+        self.sheet.normal(self.side(node).triangle)
+    }
+
     /// Takes a node to lie on the sheet.
     pub(crate) fn put_on(&mut self, node: u32) {
         if let Some(side) = &mut self.found[node as usize] {
@@ -212,7 +220,7 @@ impl<'a> Sides<'a> {
 
     /// Adds the next node, which lies on the sheet.
     pub(crate) fn push_on(&mut self) {
-        self.found.push(Some(Side { sign: 0, height: 0.0 }));
+        self.found.push(Some(Side { sign: 0, height: 0.0, triangle: 0 }));
     }
 
     /// Whether a node was found, or taken, to lie on the sheet.
@@ -257,11 +265,8 @@ pub(crate) fn crossed_edges(
     found.dedup_by_key(|(nodes, _)| *nodes);
     let edge = |(nodes, tetrahedron): ([u32; 2], u32)| {
         let ends = nodes.map(|node| draft.positions[node as usize]);
-        let heights = nodes.map(|node| sides.side(node).height.abs());
-        let t = hit(sheet, &ends).unwrap_or_else(|| {
-            let sum = heights[0] + heights[1];
-            if sum > 0.0 { heights[0] / sum } else { 0.5 }
-        });
+        let heights = nodes.map(|node| sides.side(node).height);
+        let t = hit(sheet, &ends).unwrap_or_else(|| beyond(sheet, &ends, heights));
         CrossedEdge { nodes, t, tetrahedron }
     };
     found.into_iter().map(edge).collect()
@@ -283,4 +288,32 @@ fn hit(sheet: &Sheet, ends: &[Point; 2]) -> Option<f64> {
     });
     hits.sort_unstable_by(f64::total_cmp);
     hits.get(hits.len() / 2).copied()
+}
+
+/// Where a segment passes from side to side beyond the border: its parameter. Its ends have heights of different signs.
+///
+/// The plane that goes on there is that of the closest triangle, which changes along the segment where the blade is bent.
+fn beyond(sheet: &Sheet, ends: &[Point; 2], heights: [f64; 2]) -> f64 {
+    const STEPS: usize = 20;
+    const CLOSE: f64 = 1e-6;
+    let close = CLOSE * (heights[0].abs() + heights[1].abs());
+    let (mut t_low, mut t_high) = (0.0, 1.0);
+    let [mut low, mut high] = heights;
+    let mut t = 0.5;
+    for step in 0..STEPS {
+        // False position, halving now and then: the height may jump.
+        let part = if step % 3 == 2 { 0.5 } else { low / (low - high) };
+        let part = if part.is_finite() { part } else { 0.5 };
+        t = t_low + part * (t_high - t_low);
+        let height = sheet.side(vec3::lerp(ends[0], ends[1], t)).height;
+        if height.abs() <= close {
+            break;
+        }
+        if (height < 0.0) == (heights[0] < 0.0) {
+            (t_low, low) = (t, height);
+        } else {
+            (t_high, high) = (t, height);
+        }
+    }
+    t
 }

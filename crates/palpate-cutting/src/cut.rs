@@ -24,11 +24,14 @@ pub struct CutOptions {
     /// No part of a split tetrahedron has a shorter edge [m] at rest, unless the whole had. With it, no number of cuts makes
     /// more than a bounded number of tetrahedra. 0 for no bound; a tenth of a mesh's mean edge costs little accuracy.
     pub min_edge: f64,
+    /// No piece comes off that has less volume at rest than this many mean tetrahedra of the mesh: it stays where it was. 0
+    /// for no bound.
+    pub min_piece: f64,
 }
 
 impl Default for CutOptions {
     fn default() -> Self {
-        Self { snap: 0.15, min_quality: 0.1, min_edge: 0.0 }
+        Self { snap: 0.15, min_quality: 0.1, min_edge: 0.0, min_piece: 1.0 }
     }
 }
 
@@ -101,10 +104,11 @@ pub fn cut(
     if !bounds.intersects(&blade.bounds()) {
         return Ok(None);
     }
+    let min_volume = options.min_piece * mesh.volume() / mesh.tetrahedra().len() as f64;
     let mut draft = Draft::new(mesh, positions);
     let mut total: Option<SheetCut> = None;
     for sheet in blade.sheets(&bounds) {
-        if let Some((next, done)) = cut_by_sheet(&draft, &sheet, options) {
+        if let Some((next, done)) = cut_by_sheet(&draft, &sheet, options, min_volume) {
             draft = next;
             total = Some(total.map_or(done, |before| before.then(done)));
         }
@@ -129,11 +133,17 @@ fn check(mesh: &Mesh, positions: &[Point], options: &CutOptions) -> Result<(), C
     if let Some(node) = positions.iter().position(|point| !is_finite(point)) {
         return Err(CutError::NonFinitePosition { node, position: positions[node] });
     }
-    let CutOptions { snap, min_quality, min_edge } = *options;
+    let CutOptions { snap, min_quality, min_edge, min_piece } = *options;
     let ranges = [
         ("snap", snap, (0.0..=0.5).contains(&snap), "in [0, 0.5]"),
         ("min_quality", min_quality, (0.0..=1.0).contains(&min_quality), "in [0, 1]"),
         ("min_edge", min_edge, min_edge >= 0.0 && min_edge.is_finite(), "a length, or 0 for none"),
+        (
+            "min_piece",
+            min_piece,
+            min_piece >= 0.0 && min_piece.is_finite(),
+            "finite, or 0 for none",
+        ),
     ];
     match ranges.into_iter().find(|(_, _, is_right, _)| !is_right) {
         Some((name, value, _, range)) => Err(CutError::Option { name, value, range }),
@@ -164,6 +174,7 @@ fn cut_by_sheet<'a>(
     draft: &Draft<'a>,
     sheet: &Sheet,
     options: &CutOptions,
+    min_volume: f64,
 ) -> Option<(Draft<'a>, SheetCut)> {
     let crossing = Crossing::find(draft, sheet);
     if crossing.is_empty() {
@@ -187,9 +198,10 @@ fn cut_by_sheet<'a>(
     for (tetrahedron, edges) in &plan.tetrahedra {
         split(&mut next, &mut is_touched, &plan, *tetrahedron, edges, first_point);
     }
-    let opened = separate::open(&mut next, &is_touched, &crossing.covered, &mut sides);
+    let (next, opened) =
+        separate::open(&next, &is_touched, &crossing.covered, &mut sides, min_volume)?;
     let done = SheetCut { snapped: plan.snapped, area: opened.area, deviation: opened.deviation };
-    (opened.copies > 0).then_some((next, done))
+    Some((next, done))
 }
 
 /// Splits one tetrahedron; its first part takes its place.

@@ -3,11 +3,14 @@
 use palpate_geometry::Point;
 use palpate_model::{Mesh, NodeOrigin};
 
+use crate::wounds::Wounds;
+
 /// A mesh that is being cut: tetrahedra and nodes as they are now, and what they were.
 #[derive(Clone)]
 pub(crate) struct Draft<'a> {
     old: &'a Mesh,
     old_positions: &'a [Point],
+    wounds: Wounds,
     /// Node indices of each tetrahedron; the first part of an old one keeps its place.
     pub(crate) tetrahedra: Vec<[u32; 4]>,
     /// The old tetrahedron that each is, or is a part of.
@@ -26,6 +29,7 @@ impl<'a> Draft<'a> {
         Self {
             old: mesh,
             old_positions: positions,
+            wounds: Wounds::find(mesh, positions),
             tetrahedra: mesh.tetrahedra().to_vec(),
             parents: (0..mesh.tetrahedra().len() as u32).collect(),
             origins: (0..mesh.nodes().len() as u32).map(NodeOrigin::kept).collect(),
@@ -55,6 +59,11 @@ impl<'a> Draft<'a> {
             }
         }
         NodeOrigin { nodes: corners, weights }
+    }
+
+    /// The lips of cuts before this one.
+    pub(crate) fn wounds(&self) -> &Wounds {
+        &self.wounds
     }
 
     /// Rest position of a node of this origin.

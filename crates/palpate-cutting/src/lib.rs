@@ -14,6 +14,7 @@ mod report;
 mod separate;
 mod snap;
 mod split;
+mod wounds;
 
 pub use blade::{
     Blade, BladeError, BladeFileError, BladeFileErrorCause, Stroke, When, parse_strokes,

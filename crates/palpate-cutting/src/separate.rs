@@ -1,6 +1,6 @@
 //! Opens the faces that lie on the sheet between its two sides, by copying nodes.
 
-use palpate_geometry::vec3;
+use palpate_geometry::{tetrahedron, vec3};
 use palpate_model::TETRAHEDRON_FACES;
 
 use crate::crossing::Sides;
@@ -10,47 +10,102 @@ use crate::groups::Groups;
 /// What was opened.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Opened {
-    /// Copies of nodes that were made.
-    pub(crate) copies: usize,
     /// Area [m²] of one lip, at present positions.
     pub(crate) area: f64,
     /// Largest distance [m] of a node of the lips from the blade's surface, continued beyond its border.
     pub(crate) deviation: f64,
 }
 
-/// Opens every face on the sheet that has tetrahedra of both sides, at least one of them touched, or is covered by the
-/// sheet.
+/// A face that is opened.
+#[derive(Clone, Copy)]
+struct CutFace {
+    /// Sorted.
+    nodes: [u32; 3],
+    /// The tetrahedra that it joined.
+    tetrahedra: [u32; 2],
+}
+
+/// The mesh with every face opened that lies on the sheet, has tetrahedra of both sides, and of which at least one is touched
+/// or the sheet covers the face; `None` when nothing comes apart.
 ///
 /// Around each node of such faces, tetrahedra that are still joined by other faces keep one copy of the node: at the end of a
-/// partial cut all of them are, and it stays closed.
-pub(crate) fn open(
-    draft: &mut Draft,
+/// partial cut all of them are, and it stays closed. Pieces of less volume at rest than `min_volume` [m³] are left where
+/// they were.
+pub(crate) fn open<'a>(
+    draft: &Draft<'a>,
     is_touched: &[bool],
     covered: &[[u32; 3]],
     sides: &mut Sides,
-) -> Opened {
-    let cut = faces_to_open(draft, is_touched, covered, sides);
+    min_volume: f64,
+) -> Option<(Draft<'a>, Opened)> {
+    let mut cut = faces_to_open(draft, is_touched, covered, sides);
     let mut opened = Opened::default();
-    let mut is_marked = vec![false; draft.positions.len()];
-    for face in &cut {
-        let [a, b, c] = face.map(|node| draft.positions[node as usize]);
-        opened.area += 0.5 * vec3::norm(vec3::cross(vec3::sub(b, a), vec3::sub(c, a)));
-        for &node in face {
+    loop {
+        let mut is_marked = vec![false; draft.positions.len()];
+        for &node in cut.iter().flat_map(|face| &face.nodes) {
             is_marked[node as usize] = true;
+        }
+        let mut next = draft.clone();
+        if copy_nodes(&mut next, &cut, &is_marked) == 0 {
+            return None;
+        }
+        let flakes = flakes(&next, &cut, min_volume);
+        let before = cut.len();
+        cut.retain(|face| {
+            let flake = face.tetrahedra.iter().find(|side| flakes.binary_search(side).is_ok());
+            for &node in flake.iter().flat_map(|&&side| &draft.tetrahedra[side as usize]) {
+                let height = sides.of(node, &draft.positions).height;
+                opened.deviation = opened.deviation.max(height.abs());
+            }
+            flake.is_none()
+        });
+        if cut.len() == before {
+            measure(draft, &cut, sides, &mut opened);
+            return Some((next, opened));
+        }
+    }
+}
+
+fn measure(draft: &Draft, cut: &[CutFace], sides: &Sides, opened: &mut Opened) {
+    for face in cut {
+        let [a, b, c] = face.nodes.map(|node| draft.positions[node as usize]);
+        opened.area += 0.5 * vec3::norm(vec3::cross(vec3::sub(b, a), vec3::sub(c, a)));
+        for &node in &face.nodes {
             opened.deviation = opened.deviation.max(sides.side(node).height.abs());
         }
     }
-    opened.copies = copy_nodes(draft, &cut, &is_marked);
-    opened
 }
 
-/// Sorted nodes of the faces to open, sorted.
+/// The tetrahedra at the cut that are part of too small a piece, sorted.
+fn flakes(draft: &Draft, cut: &[CutFace], min_volume: f64) -> Vec<u32> {
+    let mut groups = Groups::new(draft.positions.len());
+    for &[a, b, c, d] in &draft.tetrahedra {
+        groups.join(a, b);
+        groups.join(a, c);
+        groups.join(a, d);
+    }
+    let mut volumes = vec![0.0; draft.positions.len()];
+    for nodes in &draft.tetrahedra {
+        let corners = nodes.map(|node| draft.rest[node as usize]);
+        volumes[groups.root(nodes[0]) as usize] += tetrahedron::signed_volume(&corners);
+    }
+    let mut small: Vec<u32> = (cut.iter().flat_map(|face| face.tetrahedra))
+        .filter(|&side| {
+            let piece = groups.root(draft.tetrahedra[side as usize][0]);
+            volumes[piece as usize] < min_volume
+        })
+        .collect();
+    small.sort_unstable();
+    small
+}
+
+/// The faces to open, sorted by nodes.
 fn faces_to_open(
     draft: &Draft,
     is_touched: &[bool],
     covered: &[[u32; 3]],
     sides: &mut Sides,
-) -> Vec<[u32; 3]> {
+) -> Vec<CutFace> {
     let mut faces: Vec<u128> = Vec::new();
     for (tetrahedron, nodes) in draft.tetrahedra.iter().enumerate() {
         let on = nodes.map(|node| sides.is_on(node));
@@ -67,12 +122,12 @@ fn faces_to_open(
         let &[left, right] = same else {
             continue;
         };
-        let (face, left, right) = (face_of(left), left as u32, right as u32);
-        let is_reached = is_touched[left as usize]
-            || is_touched[right as usize]
-            || covered.binary_search(&face).is_ok();
+        let (nodes, tetrahedra) = (face_of(left), [left as u32, right as u32]);
+        let is_reached = tetrahedra.iter().any(|&side| is_touched[side as usize])
+            || covered.binary_search(&nodes).is_ok();
+        let [left, right] = tetrahedra;
         if is_reached && is_above(draft, left, sides) != is_above(draft, right, sides) {
-            cut.push(face);
+            cut.push(CutFace { nodes, tetrahedra });
         }
     }
     cut
@@ -90,7 +145,7 @@ fn is_above(draft: &Draft, tetrahedron: u32, sides: &mut Sides) -> bool {
 }
 
 /// Gives each group of tetrahedra around a marked node its own copy; returns how many were made.
-fn copy_nodes(draft: &mut Draft, cut: &[[u32; 3]], is_marked: &[bool]) -> usize {
+fn copy_nodes(draft: &mut Draft, cut: &[CutFace], is_marked: &[bool]) -> usize {
     let has_marked = |nodes: &[u32]| nodes.iter().any(|&node| is_marked[node as usize]);
     let around: Vec<u32> = (0..draft.tetrahedra.len() as u32)
         .filter(|&tetrahedron| has_marked(&draft.tetrahedra[tetrahedron as usize]))
@@ -100,7 +155,7 @@ fn copy_nodes(draft: &mut Draft, cut: &[[u32; 3]], is_marked: &[bool]) -> usize 
         let nodes = draft.tetrahedra[tetrahedron as usize];
         for face in TETRAHEDRON_FACES {
             let face = sorted(face.map(|corner| nodes[corner]));
-            if has_marked(&face) && cut.binary_search(&face).is_err() {
+            if has_marked(&face) && cut.binary_search_by_key(&face, |cut| cut.nodes).is_err() {
                 faces.push(packed(face, place as u32));
             }
         }

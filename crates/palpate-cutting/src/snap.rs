@@ -65,7 +65,7 @@ pub(crate) fn plan(
     options: &CutOptions,
 ) -> Plan {
     let mut splits: Vec<Split> = edges.iter().map(|&edge| split_at(draft, edge)).collect();
-    let mut snapped = snap_close(&mut splits, sides, options);
+    let mut snapped = snap_close(draft, &mut splits, sides, options);
     let is_live =
         |split: &Split, sides: &Sides| split.edge.nodes.iter().all(|&node| sides.sign(node) != 0);
     splits.retain(|split| is_live(split, sides));
@@ -102,7 +102,15 @@ fn split_at(draft: &Draft, edge: CrossedEdge) -> Split {
 }
 
 /// Takes the nodes close to the sheet, the closest first; returns how many.
-fn snap_close(splits: &mut [Split], sides: &mut Sides, options: &CutOptions) -> usize {
+///
+/// Along the lips of an earlier cut the nearer end counts wherever it is: where that cut ended this one goes on from there, else
+/// they would pass each other and leave a bridge; and a blade that goes through a wound again shaves nothing off its lips.
+fn snap_close(
+    draft: &Draft,
+    splits: &mut [Split],
+    sides: &mut Sides,
+    options: &CutOptions,
+) -> usize {
     splits.sort_unstable_by(|left, right| {
         let closer_first = left.nearer().0.total_cmp(&right.nearer().0);
         closer_first.then(left.edge.nodes.cmp(&right.edge.nodes))
@@ -110,7 +118,9 @@ fn snap_close(splits: &mut [Split], sides: &mut Sides, options: &CutOptions) -> 
     let mut snapped = 0;
     for split in splits {
         let (t, node) = split.nearer();
-        let is_close = t < options.snap || t * split.length_squared.sqrt() < options.min_edge;
+        let is_close = t < options.snap
+            || draft.wounds().is_along(node, sides.normal(node))
+            || t * split.length_squared.sqrt() < options.min_edge;
         if is_close && split.edge.nodes.iter().all(|&node| sides.sign(node) != 0) {
             sides.put_on(node);
             snapped += 1;

@@ -33,6 +33,8 @@ pub(crate) struct Side {
     pub(crate) sign: i8,
     /// Signed distance [m] from that plane, rounded.
     pub(crate) height: f64,
+    /// That triangle.
+    pub(crate) triangle: u32,
 }
 
 impl Sheet {
@@ -106,7 +108,7 @@ impl Sheet {
         let (height, triangle) = best.unwrap_or((f64::INFINITY, 0));
         let &[a, b, c] = self.corners(triangle);
         let sign = orient3d(a, b, c, point);
-        Side { sign, height: f64::from(sign) * height.abs() }
+        Side { sign, height: f64::from(sign) * height.abs(), triangle }
     }
 
     /// Calls `visit` with each triangle that may be within the square root of `limit` of `point`, and its squared

@@ -1,18 +1,26 @@
 //! Random blades in random boxes.
 
-use palpate_cutting::{Blade, CutOptions};
+use palpate_cutting::{Blade, CutOptions, cut};
 use palpate_geometry::{Point, TriangleFeature, point_triangle, vec3};
+use palpate_model::Mesh;
 use proptest::prelude::*;
 
-use crate::support::{box_mesh, checked_cut};
+use crate::support::{Random, box_mesh, checked_cut};
 
 fn point(low: f64, high: f64) -> impl Strategy<Value = Point> {
     proptest::array::uniform3(low..high)
 }
 
 fn options() -> impl Strategy<Value = CutOptions> {
-    (0.0..0.4, 0.0..0.3, prop_oneof![Just(0.0), 0.0..0.5])
-        .prop_map(|(snap, min_quality, min_edge)| CutOptions { snap, min_quality, min_edge })
+    let or_none = |most: f64| prop_oneof![Just(0.0), 0.0..most];
+    (or_none(0.4), or_none(0.3), or_none(0.5), or_none(3.0)).prop_map(
+        |(snap, min_quality, min_edge, min_piece)| CutOptions {
+            snap,
+            min_quality,
+            min_edge,
+            min_piece,
+        },
+    )
 }
 
 proptest! {
@@ -81,6 +89,76 @@ proptest! {
                 "{heights:?} {slack}"
             );
         }
+    }
+
+    #[test]
+    fn a_body_bent_out_of_shape_is_cut_all_the_same(
+        seed in 0_u64..1000,
+        noise in prop_oneof![Just(0.0), 0.1..3.0],
+        scale in prop_oneof![Just(0.0), Just(1.0), Just(1e-60), Just(1e60)],
+        at in point(0.0, 3.0),
+        normal in point(-1.0, 1.0),
+        size in proptest::option::of(0.5..5.0),
+        options in options(),
+    ) {
+        // Nodes anywhere: flat and inverted tetrahedra, or all in one point.
+        let mesh = box_mesh([3, 3, 3], 0.18, seed);
+        let mut random = Random(seed);
+        let positions: Vec<Point> = (mesh.nodes().iter())
+            .map(|point| point.map(|value| scale * (value + noise * random.between(-1.0, 1.0))))
+            .collect();
+        prop_assume!(vec3::norm(normal) > 0.1);
+        let size = size.map(|size: f64| size * if scale > 0.0 { scale } else { 1.0 });
+        let blade = Blade::plane(at.map(|value| scale * value), normal, size).unwrap();
+        checked_cut(&mesh, &positions, &blade, &options);
+    }
+
+    #[test]
+    fn size_does_not_matter(
+        seed in 0_u64..1000,
+        at in point(0.7, 3.3),
+        normal in point(-1.0, 1.0),
+        exponent in -30_i32..30,
+        options in options(),
+    ) {
+        prop_assume!(vec3::norm(normal) > 0.1);
+        let factor = 2.0_f64.powi(exponent);
+        let scaled = |points: &[Point]| -> Vec<Point> {
+            points.iter().map(|point| point.map(|value| factor * value)).collect()
+        };
+        let mesh = box_mesh([4, 4, 4], 0.18, seed);
+        let edge = |x: f64| [[x, at[1], 5.0], vec3::add_scaled([x, at[1], 5.0], normal, 4.0)];
+        let edges = [edge(-1.0), edge(at[0]), edge(6.0)];
+        let cut_at = |mesh: &Mesh, edges: &[[Point; 2]], options: &CutOptions| {
+            Blade::stroke(edges).ok().and_then(|blade| cut(mesh, mesh.nodes(), &blade, options).unwrap())
+        };
+        let small = cut_at(&mesh, &edges, &options);
+        let edges = edges.map(|edge| edge.map(|point| point.map(|value| factor * value)));
+        let large = mesh.with_nodes(scaled(mesh.nodes())).unwrap();
+        let options = CutOptions { min_edge: factor * options.min_edge, ..options };
+        let large = cut_at(&large, &edges, &options);
+        prop_assert_eq!(small.is_some(), large.is_some());
+        if let (Some(small), Some(large)) = (small, large) {
+            prop_assert_eq!(small.change.mesh.tetrahedra(), large.change.mesh.tetrahedra());
+            prop_assert_eq!(scaled(small.change.mesh.nodes()), large.change.mesh.nodes());
+        }
+    }
+
+    #[test]
+    fn cutting_again_at_the_same_place_finds_nothing(
+        seed in 0_u64..1000,
+        at in point(0.7, 3.3),
+        normal in point(-1.0, 1.0),
+    ) {
+        prop_assume!(vec3::norm(normal) > 0.1);
+        let mesh = box_mesh([4, 4, 4], 0.18, seed);
+        let blade = Blade::plane(at, normal, None).unwrap();
+        let options = CutOptions::default();
+        let Some(first) = checked_cut(&mesh, mesh.nodes(), &blade, &options) else {
+            return Ok(());
+        };
+        let second = cut(&first.change.mesh, &first.positions, &blade, &options).unwrap();
+        prop_assert_eq!(second.map(|cut| cut.report), None);
     }
 }
 

@@ -169,3 +169,42 @@ fn one_lip_alone_can_be_cut() {
     let second = cut_by(old, &blade);
     assert_eq!(second.report.pieces, 3);
 }
+
+/// The box with what is strictly on either side of the plane y = `at` moved apart by `gap`.
+fn gaping(mesh: &Mesh, at: f64, gap: f64) -> Vec<Point> {
+    let mut sums = vec![(0.0, 0.0); mesh.nodes().len()];
+    for (index, corners) in mesh.tetrahedra().iter().enumerate() {
+        let middle: f64 =
+            mesh.tetrahedron_corners(index).iter().map(|corner| 0.25 * corner[1]).sum();
+        for &node in corners {
+            let (sum, count) = &mut sums[node as usize];
+            (*sum, *count) = (*sum + (middle - at).signum(), *count + 1.0);
+        }
+    }
+    let shifted =
+        |(&[x, y, z], (sum, count)): (&Point, (f64, f64))| [x, y + 0.5 * gap * sum / count, z];
+    mesh.nodes().iter().zip(sums).map(shifted).collect()
+}
+
+#[test]
+fn a_scalpel_that_opens_what_it_cuts_leaves_two_pieces() {
+    for seed in 0..20_u64 {
+        let gap = 0.02 * seed as f64;
+        let mesh = box_mesh([5, 4, 3], 0.1, seed);
+        let options = CutOptions { min_edge: 0.1, ..CutOptions::default() };
+        let places: Vec<_> =
+            (0..=72).map(|k| edge(-0.5 + f64::from(k) / 12.0, 2.2, -1.0)).collect();
+        let mut now = mesh.clone();
+        for pair in places.windows(2) {
+            let positions = gaping(&now, 2.2, gap);
+            let blade = Blade::stroke(pair).unwrap();
+            if let Some(step) = checked_cut(&now, &positions, &blade, &options) {
+                now = (*step.change.mesh).clone();
+            }
+        }
+        let whole = cut_by(&mesh, &Blade::stroke(&places).unwrap());
+        let [slow, fast] = [now.tetrahedra().len(), whole.change.mesh.tetrahedra().len()];
+        assert_eq!(now.pieces().len(), 2, "{seed}");
+        assert!(slow < 2 * fast, "{slow} {fast}");
+    }
+}

@@ -102,7 +102,12 @@ fn as_many_random_cuts_as_asked_for() {
     let cuts: usize = asked.unwrap_or(200);
     for seed in 0..10 {
         let snap = 0.04 * seed as f64;
-        let options = CutOptions { snap, min_quality: 0.03 * seed as f64, min_edge: 0.02 };
+        let options = CutOptions {
+            snap,
+            min_quality: 0.03 * seed as f64,
+            min_edge: 0.02,
+            min_piece: 0.3 * seed as f64,
+        };
         cut_often(cuts / 10, 2, seed, &options);
     }
 }
