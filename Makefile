@@ -9,7 +9,7 @@ SOURCES := pyproject.toml Cargo.toml Cargo.lock $(shell find crates -name '*.rs'
 CRATES := --workspace --exclude palpate-python
 
 .DEFAULT_GOAL := help
-.PHONY: help install run test test-rust test-python soak lint format bench docs wheel models three clean
+.PHONY: help install run view test test-rust test-python soak lint format bench docs wheel models three clean
 
 help: ## Show this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /\1\t/' | expand -t 14
@@ -26,6 +26,9 @@ install: $(VENV)/.installed ## Build the core and install the package into .venv
 
 run: install ## Simulate the paper's case 1: results in out/
 	$(BIN)/palpate simulate models/case1.bml --output out $(ARGS)
+
+view: install ## Show the paper's case 2 in the browser
+	$(BIN)/palpate view case2 $(ARGS)
 
 test: test-rust test-python ## Run every test: Rust, Python, documents, examples
 

@@ -49,6 +49,8 @@ def _row(parameter: Any) -> str:
             names += f" {parameter.metavar or parameter.name.upper()}"
     default = getattr(parameter.default, "value", parameter.default)  # of an enumeration
     shown = f"`{default}`" if isinstance(default, (int, float, str, Path)) else ""
+    if isinstance(default, float):
+        shown = f"`{default:.4g}`"
     if isinstance(default, bool):
         shown = ""
     text = " ".join((parameter.help or "").split()).replace("|", "\\|")

@@ -41,6 +41,8 @@ html_theme = "furo"
 html_title = f"palpate {version}"
 html_show_copyright = False
 html_copy_source = False
+html_static_path = ["_static"]
+html_css_files = ["palpate.css"]
 html_theme_options = {"navigation_with_keys": True}
 
 #: A link to a file of the repository that is not part of the manual; pictures are.
