@@ -1,7 +1,11 @@
 """The viewer: its protocol, its session without a browser, its server against strangers."""
 
 import json
+import re
+import signal
 import socket
+import subprocess
+import sys
 import time
 import urllib.error
 import urllib.request
@@ -572,3 +576,21 @@ def test_a_taken_port_is_not_the_end(served):
             read(page, "frame")
     with pytest.raises(ViewerError, match=r"203\.0\.113\.1"):
         Viewer(lambda: LivePlayer(palpate.Simulation("small")), host="203.0.113.1", port=0)
+
+
+def test_the_command_serves_until_ctrl_c(tmp_path):
+    path = tmp_path / "model.bml"
+    path.write_text("BRANCH {\n  TREE { NE nothing.seg }\n}\n")
+    command = [sys.executable, "-m", "palpate.cli", "view", str(path), "--no-browser"]
+    with subprocess.Popen([*command, "--port", "0"], stdout=subprocess.PIPE, text=True) as process:
+        try:
+            line = process.stdout.readline()
+            url = re.search(r"http://127\.0\.0\.1:\d+/", line).group()
+            with urllib.request.urlopen(url) as answer:
+                assert answer.status == 200
+            with connect(url.replace("http", "ws") + "socket") as page:
+                assert "nothing.seg" in read(page, "problem")[0]["text"]
+            process.send_signal(signal.SIGINT)
+            assert process.wait(20) == 0
+        finally:
+            process.kill()

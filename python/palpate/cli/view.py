@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from pathlib import Path
 from typing import Annotated
@@ -95,4 +96,5 @@ def view(
         console().print(f"{target} at {viewer.url} (Ctrl-C ends it)")
         if not no_browser:
             viewer.open_browser()
-        viewer.wait()
+        with contextlib.suppress(KeyboardInterrupt):
+            viewer.wait()
