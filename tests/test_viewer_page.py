@@ -116,6 +116,13 @@ def test_what_is_shown_can_be_chosen(page, tmp_path):
     assert np.abs(picture(page, tmp_path / "plain.png") - painted).max() > 0.3
 
 
+def test_a_picture_is_saved(page):
+    size = page.run("palpate.stage.picture().then((each) => each.size)")
+    assert size > 5000
+    type_ = page.run("palpate.stage.picture().then((each) => each.type)")
+    assert type_ == "image/png"
+
+
 def test_settings_of_a_body_reach_the_simulation(page):
     page.run("document.querySelector('.body .who').click()")
     page.run(
@@ -127,6 +134,34 @@ def test_settings_of_a_body_reach_the_simulation(page):
     )
     page.wait("palpate.state.bodies[0].material.young === 25000")
     page.wait("document.querySelector('.body [aria-label=\"Stiffness\"]').value === '25000'")
+
+
+def test_creases_are_sharp_and_the_rest_is_smooth(page, make_box):
+    def split(mesh):
+        """How many corners each node becomes."""
+        return page.run(
+            f"""import("palpate/bodies").then(({{ split }}) => {{
+              const {{ origin, index }} = split({mesh.nodes.ravel().tolist()},
+                                                {mesh.triangles.ravel().tolist()});
+              const same = index.every((corner, i) =>
+                origin[corner] === {mesh.triangles.ravel().tolist()}[i]);
+              return [same, Array.from(origin)];
+            }})"""
+        )
+
+    same, origin = split(make_box((2, 2, 2)))
+    # 8 corners of three faces, 12 edges' middles of two, 6 faces' middles of one.
+    assert same
+    assert sorted(np.unique(origin, return_counts=True)[1]) == [1] * 6 + [2] * 12 + [3] * 8
+    ball = palpate.read_model("small").bodies[0].mesh
+    same, origin = split(
+        palpate.Mesh(
+            ball.nodes[ball.surface_nodes],
+            triangles=np.searchsorted(ball.surface_nodes, ball.triangles),
+        )
+    )
+    assert same
+    assert len(origin) == len(ball.surface_nodes)
 
 
 def test_the_camera_turns_with_the_mouse(page):

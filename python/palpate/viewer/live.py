@@ -191,6 +191,7 @@ class LivePlayer(Player):
         if self._remade:
             start = self._hands.with_probe(self._start)
             self._replace(self._simulation_of(start, self._simulation.time_step))
+            self._remade = False
         else:
             self._simulation.reset()
         self._new_topology()

@@ -20,6 +20,7 @@ export class Transport {
     this.reset = button("reset", "Back to the start (R)", "M5 12a7 7 0 1 0 2.2-5.100M4.5 4.500v4h4", () => app.reset());
     this.undo = button("undo", "Undo the cut (Z)", "M9 14 4.5 9.5 9 5M5 9.500h9a5 5 0 0 1 0 10h-3", () => app.send({ type: "undo" }));
     this.frame = button("frame", "Frame the scene (F)", "M4 9V5h4M16 5h4v4M20 15v4h-4M8 19H4v-4", () => app.stage.frameCamera());
+    this.picture = button("picture", "Save a picture (S)", "M4 8h3l2-2.5h6L17 8h3v11H4zM12 10a3.3 3.3 0 1 0 0 6.6 3.3 3.3 0 0 0 0-6.6", () => app.savePicture());
     this.help = button("help", "Help (?)", "M9.2 9.3a2.9 2.9 0 1 1 4.2 2.6c-.9.5-1.4 1.1-1.4 2.1M12 17.4v.1M12 3a9 9 0 1 0 0 18 9 9 0 0 0 0-18", () => app.help());
     this.time = make("span", { class: "time", title: "Simulated time" }, "0.00 s");
     this.speed = make(
@@ -31,7 +32,7 @@ export class Transport {
     this.slider = make("input", { type: "range", min: 0, value: 0, step: 1, "aria-label": "Moment of the recording", hidden: true });
     this.slider.oninput = () => app.send({ type: "seek", frame: Number(this.slider.value) });
     const bar = () => make("span", { class: "bar" });
-    element.append(this.reset, this.play, this.step, bar(), this.time, this.slider, this.speed, bar(), this.undo, this.frame, this.help);
+    element.append(this.reset, this.play, this.step, bar(), this.time, this.slider, this.speed, bar(), this.undo, this.frame, this.picture, this.help);
   }
 
   choose() {

@@ -260,6 +260,13 @@ class App {
     this.send({ type: "reset" });
   }
 
+  async savePicture() {
+    const picture = URL.createObjectURL(await this.stage.picture());
+    const name = `${find("title").textContent || "palpate"} ${this.time?.toFixed(2) ?? 0} s.png`;
+    Object.assign(document.createElement("a"), { href: picture, download: name }).click();
+    setTimeout(() => URL.revokeObjectURL(picture), 10_000);
+  }
+
   help() {
     find("help").showModal();
   }
@@ -277,7 +284,7 @@ class App {
     const modes = { 1: "look", 2: "pull", 3: "push", 4: "cut" };
     const actions = {
       " ": () => this.togglePlay(), arrowright: () => this.step(), r: () => this.reset(), f: () => this.stage.frameCamera(),
-      z: () => this.can("cut") && this.send({ type: "undo" }), p: () => this.togglePanel(), escape: () => this.pointer.cancel(), "?": () => this.help(),
+      z: () => this.can("cut") && this.send({ type: "undo" }), p: () => this.togglePanel(), escape: () => this.pointer.cancel(), "?": () => this.help(), s: () => this.savePicture(),
     };
     if (toggles[key]) this.set({ [toggles[key]]: !this.view[toggles[key]] });
     else if (modes[key]) {

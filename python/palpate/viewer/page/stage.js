@@ -146,6 +146,12 @@ export class Stage {
     this.touch();
   }
 
+  /** The scene as PNG with a clear background, as large as it is shown. */
+  picture() {
+    this.renderer.render(this.scene, this.camera);
+    return new Promise((done) => this.canvas.toBlob(done, "image/png"));
+  }
+
   /** Something changed: draw again. */
   touch() {
     this.dirty = true;
