@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from palpate._arrays import Float64Array, IndexArray
+from palpate._arrays import Float64Array
 from palpate.mesh import Mesh
 
 
@@ -95,27 +95,35 @@ class Strain:
     """
 
     def __init__(self, mesh: Mesh) -> None:
-        self._tetrahedra = mesh.tetrahedra
         self._count = len(mesh.nodes)
-        edges = _edges(mesh.nodes, mesh.tetrahedra)
-        self._inverse = np.linalg.inv(edges)
-        users = np.bincount(mesh.tetrahedra.reshape(-1), minlength=self._count)
+        seen = np.zeros(self._count, dtype=bool)
+        seen[mesh.triangles] = True
+        # Only what is seen: the tetrahedra around surface nodes.
+        tetrahedra = mesh.tetrahedra[seen[mesh.tetrahedra].any(axis=1)]
+        self._corners = np.ascontiguousarray(tetrahedra.T)
+        edges = self._edges(mesh.nodes).astype(np.float64)
+        inverse = np.linalg.inv(np.moveaxis(edges, 2, 0))
+        self._inverse = np.ascontiguousarray(np.moveaxis(inverse, 0, 2)).astype(np.float32)
+        users = np.bincount(self._corners.reshape(-1), minlength=self._count)
         self._share = 1 / np.maximum(users, 1)
 
     def of(self, positions: Float64Array) -> Float64Array:
-        """One number per node, (n,)."""
-        gradient = self._inverse @ _edges(positions, self._tetrahedra)  # of the motion, transposed
-        green = 0.5 * (gradient @ np.swapaxes(gradient, 1, 2) - np.eye(3))
-        trace = np.trace(green, axis1=1, axis2=2)
-        squared = np.einsum("mij,mij->m", green, green) - trace**2 / 3
-        strain = np.sqrt(np.maximum(squared, 0) * (2 / 3))
-        nodes = self._tetrahedra.reshape(-1)
-        total = np.bincount(nodes, weights=np.repeat(strain, 4), minlength=self._count)
+        """One number per node, (n,); right at surface nodes."""
+        edges, inverse = self._edges(positions), self._inverse
+        # Rows of the transposed deformation gradient, then its right Cauchy-Green tensor.
+        rows = [sum(inverse[i, k] * edges[k] for k in range(3)) for i in range(3)]
+        c = {(i, j): (rows[i] * rows[j]).sum(axis=0) for i in range(3) for j in range(i, 3)}
+        squared = (c[0, 0] - c[1, 1]) ** 2 + (c[1, 1] - c[2, 2]) ** 2 + (c[2, 2] - c[0, 0]) ** 2
+        squared += 6 * (c[0, 1] ** 2 + c[1, 2] ** 2 + c[0, 2] ** 2)
+        strain = np.sqrt(squared / 18)
+        nodes = self._corners.reshape(-1)
+        total = np.bincount(nodes, weights=np.tile(strain, 4), minlength=self._count)
         at_nodes: Float64Array = total * self._share
         return at_nodes
 
-
-def _edges(nodes: Float64Array, tetrahedra: IndexArray) -> Float64Array:
-    """Rows: from the first node to the three others, (m, 3, 3)."""
-    edges: Float64Array = nodes[tetrahedra[:, 1:]] - nodes[tetrahedra[:, :1]]
-    return edges
+    def _edges(self, nodes: Float64Array) -> npt.NDArray[np.float32]:
+        """From the first corner to the three others: edge, coordinate, tetrahedron."""
+        points = np.ascontiguousarray(nodes.T)
+        corners = points[:, self._corners]
+        edges = np.moveaxis(corners[:, 1:] - corners[:, :1], 1, 0)
+        return np.ascontiguousarray(edges, dtype=np.float32)

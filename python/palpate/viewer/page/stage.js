@@ -190,7 +190,7 @@ export class Stage {
     this.since = undefined;
     if (rate >= SLOW || this.counted < 3) return;
     if (this.renderer.shadowMap.enabled) this.shadows(false);
-    else this.renderer.setPixelRatio(Math.max(0.75, this.renderer.getPixelRatio() * 0.75));
+    else if (this.renderer.getPixelRatio() > 0.75) this.renderer.setPixelRatio(0.75);
     this.touch(); // a new size clears the canvas
   }
 
