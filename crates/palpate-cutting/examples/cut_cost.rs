@@ -62,6 +62,45 @@ fn main() -> Result<(), Box<dyn Error>> {
             );
         }
     }
+    step_by_step(&mesh)
+}
+
+/// A stroke of many steps, each a blade of its own, as a tool moves: most do nothing, as the tetrahedra they reach are cut
+/// already.
+#[allow(clippy::print_stdout)]
+fn step_by_step(mesh: &Mesh) -> Result<(), Box<dyn Error>> {
+    let (center, extent) = (mesh.bounds().center(), mesh.bounds().extent());
+    let edge = |k: i32| {
+        let s = f64::from(k) / 100.0;
+        let x = center[0] + 1.2 * extent[0] * (s - 0.5);
+        let y = center[1] + 0.1 * extent[1] * (9.0 * s).sin();
+        [[x, y, center[2] + extent[2]], [x, y, center[2]]]
+    };
+    let options = CutOptions { min_edge: 0.1 * mesh.mean_surface_edge(), ..CutOptions::default() };
+    let (mut now, mut positions) = (mesh.clone(), mesh.nodes().to_vec());
+    let (mut opened, mut idle, mut area) = (Vec::new(), Vec::new(), 0.0);
+    for k in 0..100 {
+        let blade = Blade::stroke(&[edge(k), edge(k + 1)])?;
+        let start = Instant::now();
+        let done = cut(&now, &positions, &blade, &options)?;
+        let time = start.elapsed().as_secs_f64() * 1e3;
+        match done {
+            Some(done) => {
+                opened.push(time);
+                area += done.report.cut_area;
+                (now, positions) = ((*done.change.mesh).clone(), done.positions);
+            }
+            None => idle.push(time),
+        }
+    }
+    println!(
+        "step by step: {} of 100 steps opened {area:.2e} m2, ms {:.2?}; the others, ms {:.2?}; {} tetrahedra, quality {:.3?}",
+        opened.len(),
+        median_and_most(opened.clone()),
+        median_and_most(idle),
+        now.tetrahedra().len(),
+        now.quality().map(|quality| quality.worst),
+    );
     Ok(())
 }
 

@@ -31,7 +31,7 @@ pub struct CutOptions {
 
 impl Default for CutOptions {
     fn default() -> Self {
-        Self { snap: 0.15, min_quality: 0.1, min_edge: 0.0, min_piece: 1.0 }
+        Self { snap: 0.15, min_quality: 0.1, min_edge: 0.0, min_piece: 4.0 }
     }
 }
 

@@ -60,17 +60,26 @@ pub(crate) fn open<'a>(
             flake.is_none()
         });
         if cut.len() == before {
-            measure(draft, &cut, sides, &mut opened);
+            measure(draft, &next, &cut, sides, &mut opened);
             return Some((next, opened));
         }
     }
 }
 
-fn measure(draft: &Draft, cut: &[CutFace], sides: &Sides, opened: &mut Opened) {
-    for face in cut {
-        let [a, b, c] = face.nodes.map(|node| draft.positions[node as usize]);
+/// Adds the faces that did come apart: at the front of a partial cut some have no copied node yet.
+fn measure(draft: &Draft, next: &Draft, cut: &[CutFace], sides: &Sides, opened: &mut Opened) {
+    let copy = |tetrahedron: u32, node: u32| {
+        let nodes = &draft.tetrahedra[tetrahedron as usize];
+        let corner = nodes.iter().position(|&other| other == node);
+        corner.map(|corner| next.tetrahedra[tetrahedron as usize][corner])
+    };
+    for &CutFace { nodes, tetrahedra: [left, right] } in cut {
+        if nodes.iter().all(|&node| copy(left, node) == copy(right, node)) {
+            continue;
+        }
+        let [a, b, c] = nodes.map(|node| draft.positions[node as usize]);
         opened.area += 0.5 * vec3::norm(vec3::cross(vec3::sub(b, a), vec3::sub(c, a)));
-        for &node in &face.nodes {
+        for node in nodes {
             opened.deviation = opened.deviation.max(sides.side(node).height.abs());
         }
     }
