@@ -4,7 +4,7 @@ use std::error::Error;
 use std::path::Path;
 use std::time::Instant;
 
-use palpate_cutting::{Blade, Cut, CutOptions, cut};
+use palpate_cutting::{Blade, Cut, CutOptions, cut, cut_on};
 use palpate_geometry::{Point, vec3};
 use palpate_model::{Mesh, ReadOptions, read_mesh};
 
@@ -77,18 +77,19 @@ fn step_by_step(mesh: &Mesh) -> Result<(), Box<dyn Error>> {
         [[x, y, center[2] + extent[2]], [x, y, center[2]]]
     };
     let options = CutOptions { min_edge: 0.1 * mesh.mean_surface_edge(), ..CutOptions::default() };
-    let (mut now, mut positions) = (mesh.clone(), mesh.nodes().to_vec());
+    let (mut now, mut positions, mut pending) = (mesh.clone(), mesh.nodes().to_vec(), Vec::new());
     let (mut opened, mut idle, mut area) = (Vec::new(), Vec::new(), 0.0);
     for k in 0..100 {
         let blade = Blade::stroke(&[edge(k), edge(k + 1)])?;
         let start = Instant::now();
-        let done = cut(&now, &positions, &blade, &options)?;
+        let done = cut_on(&now, &positions, &blade, &pending, &options)?;
         let time = start.elapsed().as_secs_f64() * 1e3;
         match done {
             Some(done) => {
                 opened.push(time);
                 area += done.report.cut_area;
                 (now, positions) = ((*done.change.mesh).clone(), done.positions);
+                pending = done.pending;
             }
             None => idle.push(time),
         }

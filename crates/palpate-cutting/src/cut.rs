@@ -10,7 +10,7 @@ use crate::groups::Groups;
 use crate::report::CutReport;
 use crate::separate;
 use crate::snap;
-use crate::split::{EdgeSplit, Parts};
+use crate::split;
 
 /// How a cut treats what the blade nearly meets.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -45,6 +45,9 @@ pub struct Cut {
     pub positions: Vec<Point>,
     /// What was done.
     pub report: CutReport,
+    /// Nodes of the faces of the new mesh that are cut but still hang together by all three nodes, at the front of a partial
+    /// cut: for [`cut_on`].
+    pub pending: Vec<[u32; 3]>,
 }
 
 /// Why a mesh could not be cut. Nothing has changed then.
@@ -99,16 +102,47 @@ pub fn cut(
     blade: &Blade,
     options: &CutOptions,
 ) -> Result<Option<Cut>, CutError> {
+    sheet_by_sheet(mesh, positions, blade, &[], options, false)
+}
+
+/// Goes on cutting where an earlier cut ended: as [`cut`], with the `pending` faces that it left.
+///
+/// A blade that moves in steps shorter than a tetrahedron cuts it through when it first enters, though all of its nodes
+/// may still hang together with others; without `pending` this is forgotten when the blade goes on, and bridges stay. In exchange the
+/// result may be a mesh that was only split, with pending faces and nothing open (`cut_area` is 0). Pending faces that
+/// are no longer faces between two tetrahedra are ignored; after another change of the mesh, give none.
+///
+/// # Errors
+/// As [`cut`].
+pub fn cut_on(
+    mesh: &Mesh,
+    positions: &[Point],
+    blade: &Blade,
+    pending: &[[u32; 3]],
+    options: &CutOptions,
+) -> Result<Option<Cut>, CutError> {
+    sheet_by_sheet(mesh, positions, blade, pending, options, true)
+}
+
+fn sheet_by_sheet(
+    mesh: &Mesh,
+    positions: &[Point],
+    blade: &Blade,
+    pending: &[[u32; 3]],
+    options: &CutOptions,
+    keeps_pending: bool,
+) -> Result<Option<Cut>, CutError> {
     check(mesh, positions, options)?;
     let bounds = Aabb::from_points(positions);
     if !bounds.intersects(&blade.bounds()) {
         return Ok(None);
     }
     let min_volume = options.min_piece * mesh.volume() / mesh.tetrahedra().len() as f64;
-    let mut draft = Draft::new(mesh, positions);
+    let limits = Limits { options: *options, min_volume, keeps_pending };
+    let mut draft = Draft::new(mesh, positions, pending);
     let mut total: Option<SheetCut> = None;
     for sheet in blade.sheets(&bounds) {
-        if let Some((next, done)) = cut_by_sheet(&draft, &sheet, options, min_volume) {
+        if let Some((next, done)) = cut_by_sheet(&draft, &sheet, &limits) {
             draft = next;
             total = Some(total.map_or(done, |before| before.then(done)));
         }
@@ -117,6 +151,15 @@ pub fn cut(
         Some(total) => finish(mesh, draft, total).map(Some),
         None => Ok(None),
     }
+}
+
+/// The options, in the units of a mesh.
+struct Limits {
+    options: CutOptions,
+    /// Smallest volume [m³] of a piece.
+    min_volume: f64,
+    /// Whether faces that are cut and not opened are of use.
+    keeps_pending: bool,
 }
 
 fn check(mesh: &Mesh, positions: &[Point], options: &CutOptions) -> Result<(), CutError> {
@@ -173,8 +216,7 @@ impl SheetCut {
 fn cut_by_sheet<'a>(
     draft: &Draft<'a>,
     sheet: &Sheet,
-    options: &CutOptions,
-    min_volume: f64,
+    limits: &Limits,
 ) -> Option<(Draft<'a>, SheetCut)> {
     let crossing = Crossing::find(draft, sheet);
     if crossing.is_empty() {
@@ -182,57 +224,25 @@ fn cut_by_sheet<'a>(
     }
     let mut sides = Sides::new(sheet, draft.positions.len());
     let edges = crossed_edges(draft, sheet, &crossing, &mut sides);
-    let plan = snap::plan(draft, &edges, &mut sides, options);
+    let plan = snap::plan(draft, &edges, &mut sides, &limits.options);
 
     let mut next = draft.clone();
     let mut is_touched = vec![false; draft.tetrahedra.len()];
     for &tetrahedron in &crossing.touched {
         is_touched[tetrahedron as usize] = true;
     }
-    let first_point = next.origins.len() as u32;
-    for split in &plan.splits {
-        let parent = draft.parents[split.edge.tetrahedron as usize];
-        next.add_node(draft.between(split.edge.nodes, split.edge.t, parent));
-        sides.push_on();
-    }
-    for (tetrahedron, edges) in &plan.tetrahedra {
-        split(&mut next, &mut is_touched, &plan, *tetrahedron, edges, first_point);
-    }
-    let (next, opened) =
-        separate::open(&next, &is_touched, &crossing.covered, &mut sides, min_volume)?;
+    split::apply(&mut next, &plan, &mut is_touched, &mut sides);
+    let Limits { min_volume, keeps_pending, .. } = *limits;
+    let (next, opened) = separate::open(
+        &next,
+        &is_touched,
+        &crossing.covered,
+        &mut sides,
+        min_volume,
+        keeps_pending,
+    )?;
     let done = SheetCut { snapped: plan.snapped, area: opened.area, deviation: opened.deviation };
     Some((next, done))
-}
-
-/// Splits one tetrahedron; its first part takes its place.
-fn split(
-    draft: &mut Draft,
-    is_touched: &mut Vec<bool>,
-    plan: &snap::Plan,
-    tetrahedron: u32,
-    edges: &[u32],
-    first_point: u32,
-) {
-    let corners = draft.tetrahedra[tetrahedron as usize];
-    let corner =
-        |node: u32| corners.iter().position(|&other| other == node).expect("an edge of it") as u8;
-    let mut splits = [EdgeSplit { corners: [0; 2], point: 0 }; 6];
-    for (place, &edge) in edges.iter().enumerate() {
-        let nodes = plan.splits[edge as usize].edge.nodes;
-        splits[place] = EdgeSplit { corners: nodes.map(corner), point: 4 + place as u8 };
-    }
-    let node = |number: u8| match number {
-        0..4 => corners[number as usize],
-        _ => first_point + edges[number as usize - 4],
-    };
-    let parts = Parts::new(&splits[..edges.len()]);
-    let (first, others) = parts.as_slice().split_first().expect("at least the whole");
-    draft.tetrahedra[tetrahedron as usize] = first.map(node);
-    for part in others {
-        draft.tetrahedra.push(part.map(node));
-        draft.parents.push(draft.parents[tetrahedron as usize]);
-        is_touched.push(is_touched[tetrahedron as usize]);
-    }
 }
 
 fn finish(mesh: &Mesh, draft: Draft, total: SheetCut) -> Result<Cut, CutError> {
@@ -241,7 +251,7 @@ fn finish(mesh: &Mesh, draft: Draft, total: SheetCut) -> Result<Cut, CutError> {
     for &parent in &draft.parents[old.len()..] {
         was_split[parent as usize] = true;
     }
-    let Draft { tetrahedra, parents, origins, rest, positions, .. } = draft;
+    let Draft { tetrahedra, parents, origins, rest, positions, pending, .. } = draft;
     let change = MeshChange::new(mesh, rest, tetrahedra, origins, parents)?;
     let new = &change.mesh;
     let parts = (0..change.tetrahedra.len())
@@ -259,7 +269,7 @@ fn finish(mesh: &Mesh, draft: Draft, total: SheetCut) -> Result<Cut, CutError> {
         cut_area: total.area,
         deviation: total.deviation,
     };
-    Ok(Cut { change, positions, report })
+    Ok(Cut { change, positions, report, pending })
 }
 
 /// How many pieces without a common node there are: `mesh.pieces().len()`, without the lists.

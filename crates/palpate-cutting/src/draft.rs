@@ -11,6 +11,8 @@ pub(crate) struct Draft<'a> {
     old: &'a Mesh,
     old_positions: &'a [Point],
     wounds: Wounds,
+    /// Sorted nodes of the faces that are cut but still hang together by all three nodes, sorted.
+    pub(crate) pending: Vec<[u32; 3]>,
     /// Node indices of each tetrahedron; the first part of an old one keeps its place.
     pub(crate) tetrahedra: Vec<[u32; 4]>,
     /// The old tetrahedron that each is, or is a part of.
@@ -24,12 +26,20 @@ pub(crate) struct Draft<'a> {
 }
 
 impl<'a> Draft<'a> {
-    /// `mesh` as it is, at `positions`.
-    pub(crate) fn new(mesh: &'a Mesh, positions: &'a [Point]) -> Self {
+    /// `mesh` as it is, at `positions`, with cut faces that are still to be opened.
+    pub(crate) fn new(mesh: &'a Mesh, positions: &'a [Point], pending: &[[u32; 3]]) -> Self {
+        let is_known =
+            |face: &&[u32; 3]| face.iter().all(|&node| (node as usize) < positions.len());
+        let mut pending: Vec<[u32; 3]> = pending.iter().filter(is_known).copied().collect();
+        for face in &mut pending {
+            face.sort_unstable();
+        }
+        pending.sort_unstable();
         Self {
             old: mesh,
             old_positions: positions,
-            wounds: Wounds::find(mesh, positions),
+            wounds: Wounds::find(mesh, positions, &pending),
+            pending,
             tetrahedra: mesh.tetrahedra().to_vec(),
             parents: (0..mesh.tetrahedra().len() as u32).collect(),
             origins: (0..mesh.nodes().len() as u32).map(NodeOrigin::kept).collect(),

@@ -20,5 +20,5 @@ pub use blade::{
     Blade, BladeError, BladeFileError, BladeFileErrorCause, Stroke, When, parse_strokes,
     read_strokes,
 };
-pub use cut::{Cut, CutError, CutOptions, cut};
+pub use cut::{Cut, CutError, CutOptions, cut, cut_on};
 pub use report::CutReport;

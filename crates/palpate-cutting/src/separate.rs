@@ -23,6 +23,16 @@ struct CutFace {
     nodes: [u32; 3],
     /// The tetrahedra that it joined.
     tetrahedra: [u32; 2],
+    /// Cut before, but not yet opened.
+    is_pending: bool,
+}
+
+/// What is left of the sides of a cut face.
+enum Outcome {
+    /// They came apart: the nodes of neither are all those of the other.
+    Open,
+    /// They hang together by these nodes, sorted.
+    Joined([u32; 3]),
 }
 
 /// The mesh with every face opened that lies on the sheet, has tetrahedra of both sides, and of which at least one is touched
@@ -37,6 +47,7 @@ pub(crate) fn open<'a>(
     covered: &[[u32; 3]],
     sides: &mut Sides,
     min_volume: f64,
+    keeps_pending: bool,
 ) -> Option<(Draft<'a>, Opened)> {
     let mut cut = faces_to_open(draft, is_touched, covered, sides);
     let mut opened = Opened::default();
@@ -46,7 +57,8 @@ pub(crate) fn open<'a>(
             is_marked[node as usize] = true;
         }
         let mut next = draft.clone();
-        if copy_nodes(&mut next, &cut, &is_marked) == 0 {
+        let copies = copy_nodes(&mut next, &cut, &is_marked);
+        if cut.iter().all(|face| face.is_pending) || (copies == 0 && !keeps_pending) {
             return None;
         }
         let flakes = flakes(&next, &cut, min_volume);
@@ -60,29 +72,47 @@ pub(crate) fn open<'a>(
             flake.is_none()
         });
         if cut.len() == before {
-            measure(draft, &next, &cut, sides, &mut opened);
+            next.pending = settle(draft, &next, &cut, sides, &mut opened);
             return Some((next, opened));
         }
     }
 }
 
-/// Adds the faces that did come apart: at the front of a partial cut some have no copied node yet.
-fn measure(draft: &Draft, next: &Draft, cut: &[CutFace], sides: &Sides, opened: &mut Opened) {
-    let copy = |tetrahedron: u32, node: u32| {
-        let nodes = &draft.tetrahedra[tetrahedron as usize];
-        let corner = nodes.iter().position(|&other| other == node);
-        corner.map(|corner| next.tetrahedra[tetrahedron as usize][corner])
-    };
-    for &CutFace { nodes, tetrahedra: [left, right] } in cut {
-        if nodes.iter().all(|&node| copy(left, node) == copy(right, node)) {
-            continue;
-        }
-        let [a, b, c] = nodes.map(|node| draft.positions[node as usize]);
-        opened.area += 0.5 * vec3::norm(vec3::cross(vec3::sub(b, a), vec3::sub(c, a)));
-        for node in nodes {
-            opened.deviation = opened.deviation.max(sides.side(node).height.abs());
+/// Measures the faces that came apart; returns the others, sorted.
+fn settle(
+    draft: &Draft,
+    next: &Draft,
+    cut: &[CutFace],
+    sides: &mut Sides,
+    opened: &mut Opened,
+) -> Vec<[u32; 3]> {
+    let mut pending = Vec::new();
+    for face in cut {
+        match outcome(draft, next, face) {
+            Outcome::Joined(nodes) => pending.push(nodes),
+            Outcome::Open => {
+                let [a, b, c] = face.nodes.map(|node| draft.positions[node as usize]);
+                opened.area += 0.5 * vec3::norm(vec3::cross(vec3::sub(b, a), vec3::sub(c, a)));
+                for node in face.nodes {
+                    let height = sides.of(node, &draft.positions).height;
+                    opened.deviation = opened.deviation.max(height.abs());
+                }
+            }
         }
     }
+    pending.sort_unstable();
+    pending
+}
+
+fn outcome(draft: &Draft, next: &Draft, face: &CutFace) -> Outcome {
+    let [left, right] = face.tetrahedra.map(|tetrahedron| {
+        let nodes = &draft.tetrahedra[tetrahedron as usize];
+        face.nodes.map(|node| {
+            let corner = nodes.iter().position(|&other| other == node);
+            next.tetrahedra[tetrahedron as usize][corner.expect("a node of its face")]
+        })
+    });
+    if left == right { Outcome::Joined(sorted(left)) } else { Outcome::Open }
 }
 
 /// The tetrahedra at the cut that are part of too small a piece, sorted.
@@ -115,9 +145,14 @@ fn faces_to_open(
     covered: &[[u32; 3]],
     sides: &mut Sides,
 ) -> Vec<CutFace> {
+    let mut is_candidate: Vec<bool> =
+        (0..draft.positions.len() as u32).map(|node| sides.is_on(node)).collect();
+    for &node in draft.pending.as_flattened() {
+        is_candidate[node as usize] = true;
+    }
     let mut faces: Vec<u128> = Vec::new();
     for (tetrahedron, nodes) in draft.tetrahedra.iter().enumerate() {
-        let on = nodes.map(|node| sides.is_on(node));
+        let on = nodes.map(|node| is_candidate[node as usize]);
         if on.iter().filter(|&&on| on).count() < 3 {
             continue;
         }
@@ -132,14 +167,29 @@ fn faces_to_open(
             continue;
         };
         let (nodes, tetrahedra) = (face_of(left), [left as u32, right as u32]);
-        let is_reached = tetrahedra.iter().any(|&side| is_touched[side as usize])
-            || covered.binary_search(&nodes).is_ok();
-        let [left, right] = tetrahedra;
-        if is_reached && is_above(draft, left, sides) != is_above(draft, right, sides) {
-            cut.push(CutFace { nodes, tetrahedra });
+        let is_pending = draft.pending.binary_search(&nodes).is_ok();
+        if is_pending || is_crossed(draft, &nodes, tetrahedra, is_touched, covered, sides) {
+            cut.push(CutFace { nodes, tetrahedra, is_pending });
         }
     }
     cut
+}
+
+/// Whether a face lies on the sheet between its sides, where the sheet reaches.
+fn is_crossed(
+    draft: &Draft,
+    nodes: &[u32; 3],
+    [left, right]: [u32; 2],
+    is_touched: &[bool],
+    covered: &[[u32; 3]],
+    sides: &mut Sides,
+) -> bool {
+    let is_reached = is_touched[left as usize]
+        || is_touched[right as usize]
+        || covered.binary_search(nodes).is_ok();
+    is_reached
+        && nodes.iter().all(|&node| sides.is_on(node))
+        && is_above(draft, left, sides) != is_above(draft, right, sides)
 }
 
 /// The side of a tetrahedron with at least three nodes on the sheet.

@@ -19,17 +19,15 @@ pub(crate) struct Wounds {
 }
 
 impl Wounds {
-    /// Finds them in a mesh whose nodes are at `positions` now.
-    pub(crate) fn find(mesh: &Mesh, positions: &[Point]) -> Self {
+    /// Finds them in a mesh whose nodes are at `positions` now; `pending` faces are cut as well.
+    pub(crate) fn find(mesh: &Mesh, positions: &[Point], pending: &[[u32; 3]]) -> Self {
         let mut is_lip = copies(mesh);
         if is_lip.contains(&true) {
             add_fronts(mesh, &mut is_lip);
         }
         let mut normals = vec![[0.0; 3]; positions.len()];
-        for triangle in mesh.triangles() {
-            if !triangle.iter().all(|&node| is_lip[node as usize]) {
-                continue;
-            }
+        let is_in_lip = |triangle: &&[u32; 3]| triangle.iter().all(|&node| is_lip[node as usize]);
+        for triangle in mesh.triangles().iter().filter(is_in_lip).chain(pending) {
             let normal = normal(&triangle.map(|node| positions[node as usize]));
             for &node in triangle {
                 let sum = &mut normals[node as usize];

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use palpate_cutting::{
-    Blade, BladeError, CutError, CutOptions, When, cut, parse_strokes, read_strokes,
+    Blade, BladeError, CutError, CutOptions, When, cut, cut_on, parse_strokes, read_strokes,
 };
 use palpate_geometry::Point;
 use palpate_model::{Mesh, MeshData};
@@ -106,6 +106,19 @@ fn cuts_that_cannot_be() {
     });
     let surface = surface.unwrap();
     assert_eq!(cut(&surface, surface.nodes(), &blade, &options), Err(CutError::SurfaceOnly));
+}
+
+#[test]
+fn pending_faces_that_are_none_are_ignored() {
+    let mesh = box_mesh([2; 3], 0.1, 0);
+    let blade = Blade::plane([1.1; 3], [0.2, 0.1, 1.0], None).unwrap();
+    let options = CutOptions::default();
+    let expected = cut(&mesh, mesh.nodes(), &blade, &options).unwrap();
+    for pending in [[u32::MAX; 3], [0, 0, 0], [0, 1, 26], [0, 26, 9999]] {
+        let found = cut_on(&mesh, mesh.nodes(), &blade, &[pending], &options).unwrap();
+        assert_eq!(found, expected);
+    }
+    assert!(expected.is_some());
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use palpate_cutting::{Blade, CutOptions};
+use palpate_cutting::{Blade, CutOptions, cut_on};
 use palpate_geometry::{Point, vec3};
 use palpate_model::{ReadOptions, read_mesh};
 
@@ -46,4 +46,40 @@ fn strokes_and_planes_through_a_kidney() {
     assert!((now.volume() / mesh.volume() - 1.0).abs() < 1e-12);
     let [before, after] = [&mesh, &now].map(|mesh| mesh.quality().unwrap().worst);
     assert!(after >= 0.999 * options.min_quality.min(before), "{before} {after}");
+}
+
+#[test]
+fn a_kidney_cut_step_by_step_opens_as_deep_as_by_one_stroke() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models/kidney.seg");
+    let mesh = read_mesh(&path, &ReadOptions::default()).unwrap().mesh;
+    let options = CutOptions { min_edge: 0.1 * mesh.mean_surface_edge(), ..CutOptions::default() };
+    let (center, extent) = (mesh.bounds().center(), mesh.bounds().extent());
+    // From end to end, down to the middle.
+    let edge = |k: usize| {
+        let s = k as f64 / 100.0;
+        let x = center[0] + 1.2 * extent[0] * (s - 0.5);
+        let y = center[1] + 0.1 * extent[1] * (9.0 * s).sin();
+        [[x, y, center[2] + extent[2]], [x, y, center[2]]]
+    };
+    for length in [1, 2, 5, 100] {
+        let (mut now, mut pending) = (mesh.clone(), Vec::new());
+        for first in (0..100).step_by(length) {
+            let edges: Vec<_> = (first..=first + length).map(edge).collect();
+            let blade = Blade::stroke(&edges).unwrap();
+            if let Some(done) = cut_on(&now, now.nodes(), &blade, &pending, &options).unwrap() {
+                (now, pending) = ((*done.change.mesh).clone(), done.pending);
+            }
+        }
+        assert_eq!(now.pieces().len(), 1);
+        // Above the tip nothing holds the halves together.
+        let is_above = |tetrahedron: &u32| {
+            let corners = now.tetrahedron_corners(*tetrahedron as usize);
+            corners.iter().all(|corner| corner[2] > center[2])
+        };
+        let below: Vec<u32> =
+            (0..now.tetrahedra().len() as u32).filter(|index| !is_above(index)).collect();
+        let halves = now.remove(&below).unwrap().mesh.pieces();
+        assert_eq!(halves.len(), 2, "{length}");
+        assert!(halves.iter().all(|half| half.len() > 2000), "{length}");
+    }
 }
