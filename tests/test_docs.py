@@ -13,6 +13,8 @@ from pathlib import Path
 
 import pytest
 
+import palpate
+
 ROOT = Path(__file__).parent.parent
 DOCS = ROOT / "docs"
 PAGES = sorted(
@@ -81,6 +83,11 @@ def test_links_between_pages_lead_somewhere():
     for page in PAGES:
         for target in re.findall(r"\]\(([^)#:]+)(?:#[^)]*)?\)", page.read_text()):
             assert (page.parent / target).exists(), f"{page}: {target}"
+
+
+def test_the_python_page_has_every_public_name():
+    named = set(re.findall(r"^\.\. auto\w+:: (\w+)$", (DOCS / "python.md").read_text(), re.M))
+    assert named == {each for each in palpate.__all__ if not each.startswith("_")}
 
 
 def test_there_is_something_to_run():

@@ -10,6 +10,7 @@ from conftest import CUBE_NODES, CUBE_TETRAHEDRA
 from test_cli import run, run_json
 
 import palpate
+from palpate.cli.mesh import _joined, describe_quality
 from palpate.meshing import ftetwild
 from palpate.meshing.nets import surface_net
 from palpate.meshing.surface import _enclosed, _unmatched_edges
@@ -149,6 +150,20 @@ def test_nets_stay_closed_around_any_voxels():
         near = np.abs(nodes[:, None] - np.argwhere(inside)[None]).max(axis=2).min(axis=1)
         assert near.max() <= 1 + 1e-12
         assert _enclosed(nodes * [1, 2, -0.5], triangles) >= 0
+
+
+def test_parts_that_grew_together_are_told():
+    points, triangles = sphere(0.05, rounds=1)
+    two = palpate.Mesh(
+        np.concatenate([points, points + np.array([0.2, 0, 0])]),
+        triangles=np.concatenate([triangles, triangles + len(points)]),
+    )
+    cube = palpate.Mesh(CUBE_NODES, CUBE_TETRAHEDRA)
+    report = describe_quality(cube, two)
+    assert report["euler_characteristic"] == {"surface": 4, "mesh": 2}
+    assert "now 2" in _joined(report)
+    assert _joined(describe_quality(cube, cube)) is None
+    assert _joined(describe_quality(cube, open_box())) is None  # not comparable
 
 
 def open_box():

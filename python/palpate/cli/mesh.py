@@ -143,6 +143,7 @@ def describe_quality(made: Mesh, surface: Mesh) -> dict[str, Any]:
     a, b = made.nodes[made.surface_edges.T]
     edges = np.linalg.norm(a - b, axis=1)
     away = Scene([surface]).closest(made.nodes[made.surface_nodes]).distances
+    before, after = _euler_characteristic(surface), _euler_characteristic(made)
     return {
         "nodes": len(made.nodes),
         "tetrahedra": len(made.tetrahedra),
@@ -154,7 +155,28 @@ def describe_quality(made: Mesh, surface: Mesh) -> dict[str, Any]:
         "dihedral_angle": {"min": float(angles.min()), "max": float(angles.max())},
         "quality": {"min": float(shape.min()), "median": float(np.median(shape))},
         "deviation": float(away.max()),
+        "euler_characteristic": {"surface": before, "mesh": after},
     }
+
+
+def _euler_characteristic(mesh: Mesh) -> int | None:
+    """Nodes - edges + triangles of a surface, 2 for a ball; None unless closed and manifold."""
+    edges = np.sort(mesh.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    unique, counts = np.unique(edges, axis=0, return_counts=True)
+    if np.any(counts != 2):
+        return None
+    return len(np.unique(mesh.triangles)) - len(unique) + len(mesh.triangles)
+
+
+def _joined(report: dict[str, Any]) -> str | None:
+    """What to tell if the mesh hangs together in another way than the surface."""
+    before, after = (report["euler_characteristic"][each] for each in ("surface", "mesh"))
+    if None in (before, after) or before == after:
+        return None
+    return (
+        f"holes, handles or parts came or went (Euler characteristic {before}, now {after}): "
+        "parts that nearly touch may have grown together; try a smaller --tolerance"
+    )
 
 
 def _print_report(path: str, made: Mesh, report: dict[str, Any], notes: list[str]) -> None:
@@ -181,6 +203,8 @@ def _print_report(path: str, made: Mesh, report: dict[str, Any], notes: list[str
     )
     for defect in made.validate():
         out.print(Text(f"warning: {defect.message}", style="yellow"))
+    if joined := _joined(report):
+        out.print(Text(f"warning: {joined}", style="yellow"))
     for note in notes:
         out.print(Text(f"note: {note}"))
 
