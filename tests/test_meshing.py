@@ -291,6 +291,7 @@ def test_a_mesher_that_dies_is_told(monkeypatch, tmp_path):
 @pytest.mark.parametrize(
     "arguments",
     [
+        ("a.stl", "b"),
         ("a.stl", "b.seg", "--label", "3"),
         ("a.nii", "b.seg", "--unit", "mm"),
         ("a.stl", "b.seg", "--unit", "inch"),
@@ -302,6 +303,11 @@ def test_a_mesher_that_dies_is_told(monkeypatch, tmp_path):
 )
 def test_wrong_usage(arguments):
     run("mesh", *arguments, status=2)
+
+
+def test_a_folder_that_is_not_there_is_told_before_the_work(tmp_path):
+    _, err = run("mesh", tmp_path / "none.stl", tmp_path / "no" / "out.seg", status=1)
+    assert f"{tmp_path / 'no'}: No such folder" in err
 
 
 def test_long_bodies_are_asked_about_millimetres(tmp_path):

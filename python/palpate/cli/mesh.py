@@ -13,6 +13,7 @@ import numpy as np
 import typer
 from rich.text import Text
 
+from palpate.cli.opening import is_mesh
 from palpate.cli.output import JsonOption, console, print_json, table, volume_text, whole
 from palpate.files import read_mesh, write_mesh
 from palpate.mesh import Mesh
@@ -96,6 +97,11 @@ def mesh(
         raise typer.BadParameter("--unit and --fill-holes are for surfaces")
     if not image and label:
         raise typer.BadParameter(f"--label is for images; {source} is none by its name")
+    # Told before the work, not after it.
+    if not is_mesh(str(target)):
+        raise typer.BadParameter(f"OUT: expected a mesh file such as organ.seg, got {target}")
+    if not target.parent.is_dir():
+        raise FileNotFoundError(2, "No such folder", str(target.parent))
     size: dict[str, Any] = {
         "nodes": nodes,
         "edge_length": edge_length,
