@@ -336,3 +336,29 @@ def test_the_machine_is_named_without_its_host():
     assert told["cores"] >= 1
     assert socket.gethostname() not in json.dumps(told)
     assert str(told["cores"]) in machine.sentence(told)
+
+
+def test_realtime_measures_each_law_and_situation(tmp_path):
+    few = ("--landing", 6, "--rest", 2, "--pulled", 3)
+    laws = ("--law", "linear", "--law", "as written")
+    run("bench", "realtime", "small", *laws, "--threads", 1, *few, "-o", tmp_path)
+    results = json.loads((tmp_path / "results.json").read_text())
+    assert [each["law"] for each in results["outcomes"]] == ["linear", "as written"]
+    for each in results["outcomes"]:
+        names = [(situation["name"], situation["frames"]) for situation in each["situations"]]
+        assert names == [("landing", 6), ("at rest", 2), ("pulled", 3)]
+        for situation in each["situations"]:
+            assert 0 < situation["median"] <= situation["p90"] <= situation["worst"]
+            assert 0 < sum(situation["stages"].values()) <= 1.05 * situation["mean"]
+        assert each["inverted"] == 0
+        assert 0 < each["factor_bytes"] < each["peak_memory"]
+        assert each["floor"] > 0
+    assert len(rows(tmp_path / "realtime.csv")) == 6
+    assert "| small |" in (tmp_path / "report.md").read_text()
+
+
+def test_a_law_that_does_not_exist_is_named(tmp_path):
+    arguments = ["bench", "realtime", "small", "--law", "rubber", "-o", str(tmp_path)]
+    result = CliRunner().invoke(app, arguments)
+    assert result.exit_code == 1
+    assert 'law "rubber" is not known; it must be one of linear, corotated' in result.output

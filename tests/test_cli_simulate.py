@@ -86,6 +86,9 @@ def test_the_report_tells_what_python_finds(finished, by_hand):
         assert len(report["energies"][kind]) == 12
         assert report["energies"][kind][-1] == joules
     assert set(report["times"]) == set(reports[0].times)
+    assert set(report["stages"]) == set(reports[0].stages)
+    fine = sum(spread["sum"] for spread in report["stages"].values())
+    assert 0.5 * report["step_count"] * report["times"]["total"]["min"] < fine
     for spread in report["times"].values():
         assert 0 <= spread["min"] <= spread["median"] <= spread["p90"] <= spread["max"]
     assert [each["name"] for each in report["bodies"]] == ["lower", "middle", "upper"]
@@ -189,6 +192,13 @@ def test_the_table_and_a_second_run_into_the_same_folder(tmp_path):
         assert word in out
     assert re.search(r"t = 0\.1 s, in motion: \d+ mm/s", out)
     assert str(folder / "report.json") in out
+
+
+def test_the_profile_names_every_stage(tmp_path):
+    out, _ = run("small", "--duration", "0.05", "--output", tmp_path, "--profile", "--no-pictures")
+    assert "Where the time went" in out
+    for stage in palpate.Simulation("small").step().stages:
+        assert stage in out
 
 
 def test_a_step_that_fails_leaves_what_was_reached(tmp_path, monkeypatch):

@@ -26,7 +26,11 @@ if TYPE_CHECKING:
 class StepReport:
     """What the last of the asked steps did, and what all of them cost.
 
-    ``times`` maps a stage to seconds, summed over the steps; ``contacts`` carry a force,
+    ``times`` maps a stage to seconds, summed over the steps, and ``stages`` the same in finer
+    parts: detection (``update``, ``penetration``, ``proximity``), the motion without new contact
+    forces (``predict``), which pairs are contacts (``filter``), how the touching nodes move each
+    other (``compliance``), the contact ``forces``, the new state (``advance``), new matrices
+    (``factor``). ``contacts`` carry a force,
     ``penetrating_nodes`` were inside another body at the start of the last step, by at most
     ``max_depth`` [m]; ``newton_iterations`` are the quasi-Newton iterations of the body that took
     most (none with the linear law), ``iterations`` the contact solver's changes of a force, both
@@ -37,6 +41,7 @@ class StepReport:
     step: int
     time: float
     times: dict[str, float]
+    stages: dict[str, float]
     proximity_pairs: int
     contacts: int
     self_contacts: int
@@ -231,6 +236,11 @@ class Simulation:
         """Surface triangles that meet right now; see `Scene.intersections`."""
         pairs, stats = self._core.intersections(bool(self_contact))
         return Intersections(pairs, DetectionStats(*stats))
+
+    @property
+    def factor_bytes(self) -> tuple[int, ...]:
+        """Bytes of each body's factored matrix: what a solve has to read at least once."""
+        return tuple(self._core.factor_bytes())
 
     def energy(self) -> dict[str, float]:
         """Kinetic, elastic and gravitational energy [J] of the deformable bodies."""

@@ -8,7 +8,7 @@ use rayon::ThreadPool;
 use rayon::prelude::*;
 
 use crate::proximity::Limit;
-use crate::scene::{DetectionStats, Frame};
+use crate::scene::{DetectionStats, Frame, ProximityOptions};
 
 /// Leaves that one thread takes at a time.
 const LEAVES_PER_TASK: usize = 256;
@@ -26,7 +26,12 @@ pub(crate) struct BodyPair {
 
 impl BodyPair {
     pub(crate) fn meeting(a: u32, b: u32) -> Self {
-        Self { a, b, limit: Limit { distance: 0.0, close_at_rest: true }, margin: 0.0 }
+        Self {
+            a,
+            b,
+            limit: Limit { distance: 0.0, options: ProximityOptions::default() },
+            margin: 0.0,
+        }
     }
 
     pub(crate) fn within(a: u32, b: u32, limit: Limit, scene_bounds: &Aabb) -> Self {

@@ -4,7 +4,7 @@ use palpate_geometry::{Point, edge_edge, point_triangle, vec3};
 
 use crate::left_out::CommonGroups;
 use crate::pairs::{PairKind, ProximityPair};
-use crate::scene::SceneBody;
+use crate::scene::{ProximityOptions, SceneBody};
 
 /// Distances below this fraction of the elements' size are too small to give a direction.
 const DIRECTION_THRESHOLD: f64 = 1e-12;
@@ -14,8 +14,7 @@ const DIRECTION_THRESHOLD: f64 = 1e-12;
 pub(crate) struct Limit {
     /// Those closer than this [m].
     pub(crate) distance: f64,
-    /// Also those that are as close where the meshes have them.
-    pub(crate) close_at_rest: bool,
+    pub(crate) options: ProximityOptions,
 }
 
 /// Node `node` of body `body_a` against triangle `triangle` of body `body_b`; `None` when they share
@@ -35,11 +34,17 @@ pub(crate) fn vertex_triangle(
     let points = b.triangle(triangle);
     let found = point_triangle(point, &points);
     let gap = found.distance_squared.sqrt();
-    let common = |groups: CommonGroups| groups.of_node_and_triangle([node, triangle]);
-    if gap >= limit.distance || CommonGroups::of(a, b).is_some_and(common) {
+    if gap >= limit.distance {
         return None;
     }
-    if !limit.close_at_rest {
+    if limit.options.each_feature_once && !is_first(b, triangle, found.weights) {
+        return None;
+    }
+    let common = |groups: CommonGroups| groups.of_node_and_triangle([node, triangle]);
+    if CommonGroups::of(a, b).is_some_and(common) {
+        return None;
+    }
+    if !limit.options.close_at_rest {
         let at_rest = corners.map(|node| b.mesh.nodes()[node as usize]);
         let found = point_triangle(a.mesh.nodes()[node as usize], &at_rest);
         if found.distance_squared.sqrt() < limit.distance {
@@ -62,6 +67,25 @@ pub(crate) fn vertex_triangle(
     })
 }
 
+/// Whether a triangle is the first of those that share what of it is closest, by the weights of the
+/// closest point.
+fn is_first(body: &SceneBody, triangle: u32, weights: [f64; 3]) -> bool {
+    let mut on = (0..3).filter(|&corner| weights[corner] != 0.0);
+    match (on.next(), on.next(), on.next()) {
+        (Some(corner), None, _) => {
+            let node = body.mesh.triangles()[triangle as usize][corner];
+            body.surface.triangles_of_nodes.around(node)[0] == triangle
+        }
+        (Some(first), Some(second), None) => {
+            // Edge i joins corners i and i + 1.
+            let place = if second == first + 1 { first } else { second };
+            let edge = body.mesh.triangle_edges()[triangle as usize][place];
+            body.surface.edge_owners[edge as usize] == triangle
+        }
+        _ => true,
+    }
+}
+
 /// Two surface edges; `None` when they share a node or are otherwise not wanted.
 pub(crate) fn edge_pair(
     bodies: &[SceneBody],
@@ -79,19 +103,22 @@ pub(crate) fn edge_pair(
     let points_b = nodes_b.map(|node| b.positions[node as usize]);
     let found = edge_edge(&points_a, &points_b);
     let gap = found.distance_squared.sqrt();
-    let common = |groups: CommonGroups| groups.of_edges([edge_a, edge_b]);
-    if gap >= limit.distance || CommonGroups::of(a, b).is_some_and(common) {
+    let (s, t) = (found.s, found.t);
+    let weights = [1.0 - s, s, t - 1.0, -t];
+    if gap >= limit.distance || (limit.options.each_feature_once && weights.contains(&0.0)) {
         return None;
     }
-    if !limit.close_at_rest {
+    let common = |groups: CommonGroups| groups.of_edges([edge_a, edge_b]);
+    if CommonGroups::of(a, b).is_some_and(common) {
+        return None;
+    }
+    if !limit.options.close_at_rest {
         let at_rest_a = nodes_a.map(|node| a.mesh.nodes()[node as usize]);
         let at_rest_b = nodes_b.map(|node| b.mesh.nodes()[node as usize]);
         if edge_edge(&at_rest_a, &at_rest_b).distance_squared.sqrt() < limit.distance {
             return None;
         }
     }
-    let (s, t) = (found.s, found.t);
-    let weights = [1.0 - s, s, t - 1.0, -t];
     let points = [points_a[0], points_a[1], points_b[0], points_b[1]];
     let along_a = vec3::sub(points_a[1], points_a[0]);
     let along_b = vec3::sub(points_b[1], points_b[0]);

@@ -381,7 +381,7 @@ impl Scene {
         let limit_of = |a: usize, b: usize| {
             let distance = if frame.is_ignored(a as u32, b as u32) { None } else { distance(a, b) };
             let distance = distance.filter(|&distance| distance > 0.0)?;
-            Some(Limit { distance, close_at_rest: options.close_at_rest })
+            Some(Limit { distance, options: *options })
         };
         self.detector.proximity(&frame, &limit_of, &mut self.proximity);
         &self.proximity

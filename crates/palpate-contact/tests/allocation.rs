@@ -57,7 +57,7 @@ fn a_frame_allocates_nothing() {
         scene.set_groups(2, &groups).expect("one for each triangle");
         scene.ignore(1, 1, true).expect("there are three");
         let shared = IntersectionOptions { shared_nodes: true, ..IntersectionOptions::default() };
-        let at_rest = ProximityOptions { close_at_rest: false };
+        let at_rest = ProximityOptions { close_at_rest: false, ..ProximityOptions::default() };
         let mut found = [0; 9];
         let mut round = |scene: &mut Scene| {
             for frame in &frames {

@@ -9,7 +9,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
-use palpate_contact::{Scene, SceneOptions};
+use palpate_contact::{ProximityOptions, Scene, SceneOptions};
 use palpate_geometry::Point;
 use palpate_mechanics::{Dynamics, DynamicsOptions};
 use palpate_model::{CoreLoader, load_model};
@@ -53,9 +53,11 @@ fn main() -> Result<(), Box<dyn Error>> {
         let mut detect = start.elapsed();
         dynamics.begin_step();
         let start = Instant::now();
+        let once = ProximityOptions { each_feature_once: true, ..ProximityOptions::default() };
         let include = |a: usize, b: usize| a != b && dynamics.search_distance(a, b).is_some();
         let penetration = scene.penetration(&include).nodes.clone();
-        let pairs = scene.proximity(&|a, b| dynamics.search_distance(a, b)).pairs.clone();
+        let pairs =
+            scene.proximity_with(&|a, b| dynamics.search_distance(a, b), &once).pairs.clone();
         detect += start.elapsed();
         let stats = dynamics.finish_step(&pairs, &penetration)?;
         let t = stats.times;

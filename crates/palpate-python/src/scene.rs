@@ -108,7 +108,12 @@ impl PyScene {
         self_contact: bool,
         close_at_rest: bool,
     ) -> PyResult<ProximityColumns<'py>> {
-        self.find_proximity(py, distance, self_contact, ProximityOptions { close_at_rest })
+        self.find_proximity(
+            py,
+            distance,
+            self_contact,
+            ProximityOptions { close_at_rest, ..ProximityOptions::default() },
+        )
     }
 
     fn contact_nodes<'py>(

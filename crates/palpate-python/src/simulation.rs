@@ -11,7 +11,7 @@ use palpate::geometry::Point;
 use palpate::mechanics::{Pull, State};
 use palpate::{Simulation, SimulationOptions, StepReport, StepTimes};
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyTuple};
+use pyo3::types::{IntoPyDict, PyDict, PyTuple};
 
 use crate::arrays::{index_matrix, matrix, points, vector};
 use crate::errors::raise;
@@ -140,8 +140,9 @@ impl PySimulation {
 
     /// Steps `count` times; what `palpate.StepReport` holds.
     fn step<'py>(&self, py: Python<'py>, count: usize) -> PyResult<Bound<'py, PyDict>> {
-        let (report, times, iterations, newton) = {
+        let (report, times, stages, iterations, newton) = {
             let mut summed = StepTimes::default();
+            let mut stages = [0.0; 9];
             let (mut iterations, mut newton) = (0, 0);
             let mut last: Option<StepReport> = None;
             for _ in 0..count {
@@ -149,11 +150,14 @@ impl PySimulation {
                 py.check_signals()?;
                 let report = raise(py, py.detach(|| self.lock().step()))?;
                 summed += report.times;
+                for (sum, (_, time)) in stages.iter_mut().zip(report.stages()) {
+                    *sum += time.as_secs_f64();
+                }
                 iterations += report.mechanics.iterations;
                 newton += report.mechanics.newton_iterations;
                 last = Some(report);
             }
-            (last.expect("count is at least one"), summed, iterations, newton)
+            (last.expect("count is at least one"), summed, stages, iterations, newton)
         };
         let seconds = PyDict::new(py);
         for (stage, time) in times.named() {
@@ -163,6 +167,8 @@ impl PySimulation {
         row.set_item("step", report.step)?;
         row.set_item("time", report.time)?;
         row.set_item("times", seconds)?;
+        let names = report.stages().map(|(stage, _)| stage);
+        row.set_item("stages", names.into_iter().zip(stages).into_py_dict(py)?)?;
         row.set_item("proximity_pairs", report.proximity_pairs)?;
         row.set_item("contacts", report.mechanics.contacts)?;
         row.set_item("self_contacts", report.mechanics.self_contacts)?;
@@ -263,6 +269,13 @@ impl PySimulation {
         });
         let (rows, stats) = raise(py, found)?;
         Ok((index_matrix(py, &rows)?, stats))
+    }
+
+    /// Bytes of each body's factor as a solve reads it; 0 for a rigid one.
+    fn factor_bytes(&self) -> Vec<usize> {
+        let guard = self.lock();
+        let bytes = |body| guard.dynamics().factor_stats(body).map_or(0, |stats| stats.bytes);
+        (0..guard.model().bodies.len()).map(bytes).collect()
     }
 
     fn energy<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {

@@ -6,7 +6,7 @@ use std::ops::AddAssign;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use palpate_contact::{PenetratingNode, Scene, SceneError, SceneOptions};
+use palpate_contact::{PenetratingNode, ProximityOptions, Scene, SceneError, SceneOptions};
 use palpate_geometry::Point;
 use palpate_mechanics::{
     Contact, Dynamics, DynamicsOptions, Energy, MechanicsError, State, StepStats,
@@ -107,6 +107,28 @@ pub struct StepReport {
     pub mechanics: StepStats,
 }
 
+/// What contacts are made of.
+const CONTACT_PAIRS: ProximityOptions =
+    ProximityOptions { close_at_rest: true, each_feature_once: true };
+
+impl StepReport {
+    /// The finest stages by name, in the order of the step; together nearly the whole of it.
+    pub fn stages(&self) -> [(&'static str, Duration); 9] {
+        let mechanics = &self.mechanics.times;
+        [
+            ("update", self.times.update),
+            ("penetration", self.times.penetration),
+            ("proximity", self.times.proximity),
+            ("predict", mechanics.predict),
+            ("filter", mechanics.filter),
+            ("compliance", mechanics.compliance),
+            ("forces", mechanics.solve),
+            ("advance", mechanics.advance),
+            ("factor", mechanics.refactor),
+        ]
+    }
+}
+
 /// Bodies of a model that fall, touch and deform.
 pub struct Simulation {
     model: Arc<Model>,
@@ -161,7 +183,8 @@ impl Simulation {
         times.penetration = begin.elapsed();
 
         let begin = Instant::now();
-        let proximity = self.scene.proximity(&|a, b| dynamics.search_distance(a, b));
+        let proximity =
+            self.scene.proximity_with(&|a, b| dynamics.search_distance(a, b), &CONTACT_PAIRS);
         times.proximity = begin.elapsed();
 
         let begin = Instant::now();

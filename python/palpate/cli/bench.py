@@ -1,4 +1,4 @@
-"""`palpate bench paper | scaling | peers`: measurements with plots and a report."""
+"""`palpate bench paper | scaling | peers | realtime`: measurements with plots and a report."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Annotated, Any
 import typer
 from rich.text import Text
 
-from palpate.bench import compare, paper, plots, scaling
+from palpate.bench import compare, paper, plots, realtime, scaling
 from palpate.bench.output import milliseconds
 from palpate.cli.opening import open_model
 from palpate.cli.output import JsonOption, console, print_json, reporting, table, whole
@@ -247,6 +247,96 @@ def bench_peers(
     _tell(output)
 
 
+def bench_realtime(
+    models: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="[MODEL]...", help="Models; case2 unless given.", show_default=False
+        ),
+    ] = None,
+    law: Annotated[
+        list[str] | None,
+        typer.Option(help="A law for all bodies, or `as written`; may be given several times."),
+    ] = None,
+    threads: Annotated[
+        list[int] | None,
+        typer.Option("--threads", min=1, help="Worker threads; may be given several times."),
+    ] = None,
+    divisions: Annotated[
+        int, typer.Option(min=1, help="Every edge in so many parts: 2 makes 8 times the elements.")
+    ] = 1,
+    landing: Annotated[int, typer.Option(min=1, help="Frames until all is at rest.")] = (
+        realtime.LANDING
+    ),
+    rest: Annotated[int, typer.Option(min=0, help="Frames at rest.")] = realtime.REST,
+    pulled: Annotated[int, typer.Option(min=0, help="Frames with a body pulled about.")] = (
+        realtime.PULLED
+    ),
+    output: Annotated[Path, _output_option("realtime")] = Path("out/bench/realtime"),
+    json_output: JsonOption = False,
+) -> None:
+    """Measure whole frames of 1/60 s: bodies that land, that rest, and one that is pulled about.
+
+    Every run is a process of its own. Writes results.json, realtime.csv and report.md.
+
+    Example: palpate bench realtime --law linear --law corotated --law neo-hookean
+
+    Example: palpate bench realtime case2 --divisions 2 --landing 20 --rest 0 --pulled 0
+    """
+    laws = law or ["linear", "corotated", "neo-hookean"]
+    counts = threads or [1, 2]
+    chosen = [(Path(name).stem, name, divisions) for name in models or ["case2"]]
+    for _, name, _ in chosen:
+        for each in laws:  # errors before anything is measured
+            realtime.with_law(open_model(name)[0], each)
+    with progress(len(chosen) * len(laws) * len(counts), quiet=json_output) as advance:
+        outcomes = realtime.run(
+            chosen,
+            output,
+            laws=laws,
+            threads=counts,
+            frames=(landing, rest, pulled),
+            advance=advance,
+        )
+    if json_output:
+        rows = [
+            {
+                "model": each.model,
+                "law": each.law,
+                "threads": each.threads,
+                "situation": situation.name,
+                "median": situation.median,
+                "p90": situation.p90,
+                "worst": situation.worst,
+            }
+            for each in outcomes
+            for situation in each.situations
+        ]
+        print_json({"output": str(output), "frames": rows})
+        return
+    console().print(
+        table(
+            "Frames of 1/60 s",
+            "model<|law<|threads|situation<|median ms|90 %|worst|frames/s",
+            [
+                (
+                    each.model,
+                    each.law,
+                    str(each.threads),
+                    situation.name,
+                    milliseconds(situation.median),
+                    milliseconds(situation.p90),
+                    milliseconds(situation.worst),
+                    realtime.rate(situation.median),
+                )
+                for each in outcomes
+                for situation in each.situations
+            ],
+        )
+    )
+    _tell(output)
+
+
 def _prepare(models: list[str] | None, *, draw: bool) -> list[tuple[str, Model]]:
     """Open the models, and find out what is missing before anything is measured."""
     if draw:
@@ -276,5 +366,6 @@ for _name, _command in (
     ("paper", bench_paper),
     ("scaling", bench_scaling),
     ("peers", bench_peers),
+    ("realtime", bench_realtime),
 ):
     bench_app.command(_name)(reporting(_command))

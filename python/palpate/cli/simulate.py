@@ -22,7 +22,7 @@ from palpate.cli.output import (
     print_json,
 )
 from palpate.cli.run import Run, RunOptions
-from palpate.cli.summary import print_summary
+from palpate.cli.summary import print_profile, print_summary
 from palpate.model import Model
 from palpate.simulation import Simulation
 
@@ -62,6 +62,9 @@ def simulate(
     resume: Annotated[
         Path | None, typer.Option(help="Continue from a checkpoint, bit for bit.")
     ] = None,
+    profile: Annotated[
+        bool, typer.Option("--profile", help="Print where the time of the steps went.")
+    ] = False,
     no_pictures: Annotated[bool, typer.Option("--no-pictures", help="Draw none.")] = False,
     json_output: JsonOption = False,
 ) -> None:
@@ -104,6 +107,8 @@ def simulate(
         print_json(report)
     elif report["step_count"]:
         print_summary(report, run.files)
+        if profile:
+            print_profile(report)
     if report["failure"]:
         at = report["end_time"]
         print(f"error: at t = {at:.4g} s: {report['failure']}", file=sys.stderr)

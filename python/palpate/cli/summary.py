@@ -10,6 +10,42 @@ from rich.text import Text
 from palpate.cli.output import console, duration_text, table, whole
 from palpate.pictures.files import length_text
 
+#: What the stages do.
+_STAGES = {
+    "update": "positions into the bounding boxes",
+    "penetration": "search for nodes inside other bodies",
+    "proximity": "search for close pairs",
+    "predict": "motion if contact forces stay as they are",
+    "filter": "which close pairs are contacts",
+    "compliance": "how touching nodes move each other",
+    "forces": "contact forces",
+    "advance": "motion with the new forces",
+    "factor": "new matrices of deformed bodies",
+}
+
+
+def print_profile(report: dict[str, Any]) -> None:
+    """Where the time of the steps went."""
+    total = report["times"]["total"]
+    stages = report["stages"]
+    whole_time = sum(spread["sum"] for spread in stages.values())
+    console().print(
+        table(
+            f"Where the time went ({duration_text(whole_time)}; "
+            f"{duration_text(total['median'])} a step in the median)",
+            "stage<|share|sum|median|p90|max|what it does<",
+            [
+                (
+                    stage,
+                    f"{100 * spread['sum'] / whole_time:.0f} %",
+                    *(duration_text(spread[key]) for key in ("sum", "median", "p90", "max")),
+                    _STAGES[stage],
+                )
+                for stage, spread in stages.items()
+            ],
+        )
+    )
+
 
 def print_summary(report: dict[str, Any], files: dict[str, Path]) -> None:
     """Stages, bodies, contacts, and where the files are."""

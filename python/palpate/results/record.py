@@ -34,6 +34,7 @@ class Record:
     def __init__(self, simulation: Simulation) -> None:
         self._model: Model = simulation.model
         self._times: dict[str, list[float]] = {}
+        self._stages: dict[str, list[float]] = {}
         self._steps: dict[str, list[Any]] = {name: [] for name in _SERIES}
         self._energies: dict[str, list[float]] = {}
         self._rest = [
@@ -56,6 +57,8 @@ class Record:
             self._steps[name].append(getattr(report, name))
         for stage, seconds in report.times.items():
             self._times.setdefault(stage, []).append(seconds)
+        for stage, seconds in report.stages.items():
+            self._stages.setdefault(stage, []).append(seconds)
         for kind, joules in simulation.energy().items():
             self._energies.setdefault(kind, []).append(joules)
 
@@ -85,6 +88,10 @@ class Record:
             "step_count": len(self),
             "steps_per_second": len(self) / total if total > 0 else None,
             "times": {stage: spread(values) for stage, values in self._times.items()},
+            "stages": {
+                stage: {**spread(values), "sum": sum(values)}
+                for stage, values in self._stages.items()
+            },
             "bodies": [
                 {
                     "name": name,

@@ -119,6 +119,17 @@ fn contact_nodes(meshes: &[Arc<Mesh>], pairs: &[TrianglePair]) -> Vec<Vec<u32>> 
     nodes
 }
 
+/// Whether no earlier triangle has the node or edge that is closest, and no end of an edge is.
+fn is_first(meshes: &[Arc<Mesh>], pair: &ProximityPair) -> bool {
+    let on: Vec<u32> = (0..4).filter(|&k| pair.weights[k] != 0.0).map(|k| pair.nodes[k]).collect();
+    if pair.kind == PairKind::EdgeEdge {
+        return on.len() == 4;
+    }
+    let triangles = meshes[pair.bodies[1] as usize].triangles();
+    let first = triangles.iter().position(|corners| on[1..].iter().all(|n| corners.contains(n)));
+    first == Some(pair.elements[1] as usize)
+}
+
 /// Compares all methods; returns how many pairs were found, and how many were left out.
 fn check(case: &Case, left_out: &LeftOut, distance: f64) -> [usize; 2] {
     let of =
@@ -128,7 +139,7 @@ fn check(case: &Case, left_out: &LeftOut, distance: f64) -> [usize; 2] {
     for scene in &mut scenes {
         left_out.apply(scene);
     }
-    let at_rest = ProximityOptions { close_at_rest: false };
+    let at_rest = ProximityOptions { close_at_rest: false, ..ProximityOptions::default() };
     let (mut kept, mut thinned) = (0, 0);
     for frame in &case.frames {
         slow.update(&as_slices(frame)).expect("finite positions");
@@ -139,6 +150,8 @@ fn check(case: &Case, left_out: &LeftOut, distance: f64) -> [usize; 2] {
         close.retain(|pair| left_out.keeps_features(&case.meshes, pair));
         let mut new = close.clone();
         new.retain(|pair| !close_at_rest(&case.meshes, pair, distance));
+        let mut first = new.clone();
+        first.retain(|pair| is_first(&case.meshes, pair));
         kept += pairs.len() + close.len();
         thinned += close.len() - new.len();
         for scene in &mut scenes {
@@ -147,6 +160,8 @@ fn check(case: &Case, left_out: &LeftOut, distance: f64) -> [usize; 2] {
             assert_eq!(scene.intersections(&SHARED).pairs, pairs, "{name}");
             assert_eq!(scene.proximity(&|_, _| Some(distance)).pairs, close, "{name}");
             assert_eq!(scene.proximity_with(&|_, _| Some(distance), &at_rest).pairs, new, "{name}");
+            let once = ProximityOptions { each_feature_once: true, ..at_rest };
+            assert_eq!(scene.proximity_with(&|_, _| Some(distance), &once).pairs, first, "{name}");
             let nodes = &scene.contact_nodes(&SHARED).nodes;
             assert_eq!(*nodes, contact_nodes(&case.meshes, &pairs), "{name}");
         }
@@ -216,7 +231,7 @@ fn a_sheet_at_rest_is_close_to_itself_and_folded_it_is_new() {
     for method in Method::ALL {
         let mut scene =
             scene(std::slice::from_ref(&flat), SceneOptions { method, ..Default::default() });
-        let new = ProximityOptions { close_at_rest: false };
+        let new = ProximityOptions { close_at_rest: false, ..ProximityOptions::default() };
         let distance = |_: usize, _: usize| Some(1.1);
         let all = scene.proximity(&distance).pairs.len();
         assert!(scene.proximity_with(&distance, &new).pairs.is_empty());
