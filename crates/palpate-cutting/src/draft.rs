@@ -1,5 +1,7 @@
 //! The mesh under the knife.
 
+use std::cell::OnceCell;
+
 use palpate_geometry::Point;
 use palpate_model::{Mesh, NodeOrigin};
 
@@ -10,7 +12,8 @@ use crate::wounds::Wounds;
 pub(crate) struct Draft<'a> {
     old: &'a Mesh,
     old_positions: &'a [Point],
-    wounds: Wounds,
+    /// Found when first asked for: most blades pass most bodies by.
+    wounds: OnceCell<Wounds>,
     /// Sorted nodes of the faces that are cut but still hang together by all three nodes, sorted.
     pub(crate) pending: Vec<[u32; 3]>,
     /// Node indices of each tetrahedron; the first part of an old one keeps its place.
@@ -38,7 +41,7 @@ impl<'a> Draft<'a> {
         Self {
             old: mesh,
             old_positions: positions,
-            wounds: Wounds::find(mesh, positions, &pending),
+            wounds: OnceCell::new(),
             pending,
             tetrahedra: mesh.tetrahedra().to_vec(),
             parents: (0..mesh.tetrahedra().len() as u32).collect(),
@@ -73,7 +76,7 @@ impl<'a> Draft<'a> {
 
     /// The lips of cuts before this one.
     pub(crate) fn wounds(&self) -> &Wounds {
-        &self.wounds
+        self.wounds.get_or_init(|| Wounds::find(self.old, self.old_positions, &self.pending))
     }
 
     /// Rest position of a node of this origin.

@@ -115,11 +115,12 @@ fn snap_close(
         let closer_first = left.nearer().0.total_cmp(&right.nearer().0);
         closer_first.then(left.edge.nodes.cmp(&right.edge.nodes))
     });
+    let wounds = draft.wounds();
     let mut snapped = 0;
     for split in splits {
         let (t, node) = split.nearer();
         let is_close = t < options.snap
-            || draft.wounds().is_along(node, sides.normal(node))
+            || wounds.is_along(node, sides.normal(node))
             || t * split.length_squared.sqrt() < options.min_edge;
         if is_close && split.edge.nodes.iter().all(|&node| sides.sign(node) != 0) {
             sides.put_on(node);

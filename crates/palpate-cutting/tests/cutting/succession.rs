@@ -4,7 +4,7 @@ use palpate_cutting::{Blade, CutOptions, cut};
 use palpate_geometry::{Point, vec3};
 use palpate_model::Mesh;
 
-use crate::support::{Random, box_mesh, checked_cut};
+use crate::support::{Random, box_mesh, checked_cut, checked_cut_on};
 
 /// A plane, a square, a stroke or a loop somewhere in the box of `size`.
 fn random_blade(random: &mut Random, size: f64) -> Option<Blade> {
@@ -39,14 +39,22 @@ fn cut_often(cuts: usize, cells: usize, seed: u64, options: &CutOptions) -> usiz
     let limit = 12 * whole.tetrahedra().len();
     let mut mesh: Mesh = whole.clone();
     let mut positions = mesh.nodes().to_vec();
+    let mut pending = Vec::new();
     let mut opened = 0;
     for _ in 0..cuts {
         let Some(blade) = random_blade(&mut random, cells as f64) else {
             continue;
         };
-        let Some(done) = checked_cut(&mesh, &positions, &blade, options) else {
+        // Sometimes with what the last cut left pending, as a tool goes on.
+        let done = if random.between(0.0, 1.0) < 0.5 && blade.parts().len() == 1 {
+            checked_cut_on(&mesh, &positions, &blade, &pending, options)
+        } else {
+            checked_cut(&mesh, &positions, &blade, options)
+        };
+        let Some(done) = done else {
             continue;
         };
+        pending = done.pending;
         opened += 1;
         // The body gapes a little, so that blades and lips are not where they were.
         let shift = |point: Point| {
@@ -56,7 +64,7 @@ fn cut_often(cuts: usize, cells: usize, seed: u64, options: &CutOptions) -> usiz
         (mesh, positions) = ((*done.change.mesh).clone(), done.positions);
         positions = positions.into_iter().map(shift).collect();
         if mesh.tetrahedra().len() > limit {
-            (mesh, positions) = (whole.clone(), whole.nodes().to_vec());
+            (mesh, positions, pending) = (whole.clone(), whole.nodes().to_vec(), Vec::new());
         }
     }
     opened
