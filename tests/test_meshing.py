@@ -113,7 +113,7 @@ def test_several_labels_are_regions_of_one_body():
     image = np.zeros((20, 10, 10), dtype=np.uint8)
     image[2:10, 2:8, 2:8] = 4
     image[10:18, 2:8, 2:8] = 9
-    mesh = palpate.mesh_image(image, [4, 9], affine=1e-3 * np.eye(4), edge_length=2e-3)
+    mesh = palpate.mesh_image(image, [4, 9], affine=1e-3 * np.eye(4), edge_length=4e-3)
     middle = mesh.nodes[mesh.tetrahedra].mean(axis=1)[:, 0]
     assert np.array_equal(mesh.regions[middle < 0.009], np.full((middle < 0.009).sum(), 4))
     assert np.array_equal(mesh.regions[middle > 0.010], np.full((middle > 0.010).sum(), 9))

@@ -191,19 +191,23 @@ def _surface(values: npt.NDArray[Any], placement: Float64Array, labels: tuple[in
 def _regions(
     mesh: Mesh, values: npt.NDArray[Any], placement: Float64Array, labels: tuple[int, ...]
 ) -> IndexArray:
-    """The label at each tetrahedron's middle; where none of them is, that of its neighbours."""
-    middles = mesh.nodes[mesh.tetrahedra].mean(axis=1) - placement[:3, 3]
-    voxels = np.rint(middles @ np.linalg.inv(placement[:3, :3]).T).astype(np.int64)
-    voxels = np.clip(voxels, 0, np.array(values.shape) - 1)
-    regions = values[tuple(voxels.T)].astype(np.int32)
-    regions[~np.isin(regions, labels)] = 0
-    while np.any(regions == 0) and np.any(regions != 0):
-        of_node = np.zeros(len(mesh.nodes), dtype=np.int32)
-        for corner in mesh.tetrahedra.T:
-            np.maximum.at(of_node, corner, regions)
-        unknown = regions == 0
-        regions[unknown] = of_node[mesh.tetrahedra[unknown]].max(axis=1)
-    return np.where(regions == 0, labels[0], regions)
+    """The label of the voxel nearest to each tetrahedron's middle that has one of the labels."""
+    axes = placement[:3, :3]
+    middles = (mesh.nodes[mesh.tetrahedra].mean(axis=1) - placement[:3, 3]) @ np.linalg.inv(axes).T
+    regions = np.zeros(len(middles), dtype=np.int32)
+    reach = 0
+    while len(unknown := np.flatnonzero(regions == 0)):
+        nearest = np.full(len(unknown), np.inf)
+        for step in np.ndindex(3 * (2 * reach + 1,)):
+            voxels = np.rint(middles[unknown]).astype(np.int64) + step - reach
+            voxels = np.clip(voxels, 0, np.array(values.shape) - 1)
+            found = values[tuple(voxels.T)]
+            away = np.linalg.norm((voxels - middles[unknown]) @ axes.T, axis=1)
+            better = np.isin(found, labels) & (away < nearest)
+            regions[unknown[better]] = found[better]
+            nearest[better] = away[better]
+        reach += 1
+    return regions
 
 
 __all__ = ["label_surface", "mesh_image"]
