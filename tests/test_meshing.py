@@ -108,6 +108,31 @@ def test_a_label_becomes_a_mesh_in_its_place(tmp_path):
     assert np.abs(away - 0.014).max() < 0.0015  # voxels are 1 x 1 x 2.5 mm
 
 
+@pytest.mark.parametrize(
+    ("space", "signs"),
+    [
+        ("right-anterior-superior", (1, 1, 1)),
+        ("left-posterior-superior", (-1, -1, 1)),
+        ("LPS", (-1, -1, 1)),
+        ("left-anterior-superior-time", (-1, 1, 1)),
+    ],
+)
+def test_the_same_image_in_nrrd_lies_where_it_does_in_nifti(tmp_path, space, signs):
+    nrrd = pytest.importorskip("nrrd")
+    nibabel = pytest.importorskip("nibabel")
+    image, affine = labels()
+    affine[:3, :3] = affine[:3, :3] @ [[0, 1, 0], [1, 0, 0], [0, 0, 1]]  # axes swapped
+    affine[:3, 3] = 10, 20, -30
+    nibabel.save(nibabel.Nifti1Image(image, affine), tmp_path / "labels.nii")
+    placed = np.diag(signs) @ affine[:3]
+    header = {"space": space, "space directions": placed[:, :3].T, "space origin": placed[:, 3]}
+    nrrd.write(str(tmp_path / "labels.seg.nrrd"), image, header)
+    there = palpate.label_surface(tmp_path / "labels.nii", 3)
+    here = palpate.label_surface(tmp_path / "labels.seg.nrrd", 3)
+    assert here.nodes == pytest.approx(there.nodes, abs=1e-12)
+    assert np.array_equal(here.triangles, there.triangles)
+
+
 def test_several_labels_are_regions_of_one_body():
     pytest.importorskip("wildmeshing")
     image = np.zeros((20, 10, 10), dtype=np.uint8)
@@ -273,9 +298,11 @@ def test_what_is_missing_is_named(tmp_path, monkeypatch):
     assert "pip install 'palpate[mesh]'" in json.dumps(error)
     monkeypatch.undo()
     monkeypatch.setitem(sys.modules, "nibabel", None)
-    (tmp_path / "image.nii").write_bytes(b"")
-    with pytest.raises(palpate.MeshError, match="nibabel: pip install 'palpate\\[mesh\\]'"):
-        palpate.label_surface(tmp_path / "image.nii")
+    monkeypatch.setitem(sys.modules, "nrrd", None)
+    for name, package in (("image.nii", "nibabel"), ("image.seg.nrrd", "pynrrd")):
+        (tmp_path / name).write_bytes(b"")
+        with pytest.raises(palpate.MeshError, match=f"{package}: pip install 'palpate\\[mesh\\]'"):
+            palpate.label_surface(tmp_path / name)
 
 
 def test_a_mesher_that_dies_is_told(monkeypatch, tmp_path):

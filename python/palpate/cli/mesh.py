@@ -19,7 +19,8 @@ from palpate.files import read_mesh, write_mesh
 from palpate.mesh import Mesh
 from palpate.meshing import mesh_surface
 from palpate.meshing.ftetwild import Progress
-from palpate.meshing.image import fill_labels, is_image
+from palpate.meshing.image import fill_labels
+from palpate.meshing.image_files import is_image
 from palpate.results.measures import dihedral_angles, mean_ratios
 from palpate.scene import Scene
 
@@ -45,7 +46,7 @@ def parse_length(text: str) -> float:
 def mesh(
     source: Annotated[
         Path,
-        typer.Argument(metavar="IN", help="Closed surface, or segmented image (NIfTI, MGH)."),
+        typer.Argument(metavar="IN", help="Closed surface, or segmented image (NIfTI, NRRD, MGH)."),
     ],
     target: Annotated[Path, typer.Argument(metavar="OUT", help="Mesh file to write, in metres.")],
     label: Annotated[

@@ -16,19 +16,9 @@ from palpate.errors import MeshError
 from palpate.mesh import Mesh
 from palpate.meshing import ftetwild
 from palpate.meshing.ftetwild import Progress
+from palpate.meshing.image_files import read_image
 from palpate.meshing.nets import surface_net
 from palpate.meshing.surface import mesh_surface
-
-#: Extensions of medical images.
-IMAGE_SUFFIXES = (".nii", ".nii.gz", ".mgz", ".mgh", ".hdr", ".img", ".mnc")
-
-#: Metres in the units that images name; millimetres where they name none.
-_UNITS = {"meter": 1.0, "mm": 1e-3, "micron": 1e-6}
-
-
-def is_image(path: str | os.PathLike[str]) -> bool:
-    """Whether the extension names a medical image."""
-    return Path(path).name.lower().endswith(IMAGE_SUFFIXES)
 
 
 def mesh_image(
@@ -47,7 +37,7 @@ def mesh_image(
     Parameters
     ----------
     image : path-like or array_like of int, shape (i, j, k)
-        An image file (NIfTI, MGH, Analyze, MINC) or the labels of its voxels.
+        An image file (NIfTI, NRRD, MGH, Analyze, MINC) or the labels of its voxels.
     label : int or sequence of int, optional
         The label; several are one body, each label a region of that number. May be left out of an
         image with one label.
@@ -109,7 +99,7 @@ def _opened(
     if isinstance(image, (str, os.PathLike)):
         if affine is not None:
             raise ValueError("affine: an image file has its own")
-        values, placement = _read(Path(image))
+        values, placement = read_image(Path(image))
         name = f"{image}: "
     else:
         values, name = np.asarray(image), ""
@@ -119,7 +109,10 @@ def _opened(
     if values.ndim == 4 and values.shape[3] == 1:
         values = values[..., 0]
     if values.ndim != 3:
-        raise MeshError(f"{name}expected an image of three dimensions, got shape {values.shape}")
+        raise MeshError(
+            f"{name}expected an image of three dimensions, got shape {values.shape}; "
+            "segments that overlap must be made a label map first"
+        )
     if placement.shape != (4, 4) or not np.isfinite(placement).all():
         raise ValueError(f"{name}affine: expected a finite (4, 4) matrix, got {placement}")
     if np.linalg.det(placement[:3, :3]) == 0:
@@ -154,29 +147,6 @@ def _labels(values: npt.NDArray[Any], label: Any, name: str) -> tuple[int, ...]:
         if each not in there:
             raise MeshError(f"{name}no voxel has label {each}; there are {listed}")
     return labels
-
-
-def _read(path: Path) -> tuple[npt.NDArray[Any], Float64Array]:
-    """Voxels and index to place [m] of an image file."""
-    try:
-        import nibabel
-    except ImportError:
-        raise MeshError(
-            f"{path}: images need the package nibabel: pip install 'palpate[mesh]'", str(path)
-        ) from None
-    if not path.exists():
-        raise FileNotFoundError(2, "No such file", str(path))
-    try:
-        image: Any = nibabel.load(path)
-        values = np.asanyarray(image.dataobj)
-    except Exception as error:
-        raise MeshError(f"{path}: not an image that can be read: {error}", str(path)) from error
-    unit = "mm"
-    if hasattr(image.header, "get_xyzt_units"):
-        unit = image.header.get_xyzt_units()[0]
-    placement = np.asarray(image.affine, dtype=np.float64).copy()
-    placement[:3] *= _UNITS.get(unit, 1e-3)
-    return values, placement
 
 
 def _surface(values: npt.NDArray[Any], placement: Float64Array, labels: tuple[int, ...]) -> Mesh:
