@@ -16,7 +16,7 @@ project = "palpate"
 author = "The palpate developers"
 version = release = palpate.__version__
 
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "command_reference"]
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "generated_pages"]
 exclude_patterns = ["_build"]
 myst_heading_anchors = 3
 suppress_warnings = [

@@ -1,5 +1,10 @@
-"""Sphinx extension: appends the commands, their arguments and options to commands.md."""
+"""Sphinx extension: appends to pages what can be read off the program.
 
+Commands, their arguments and options to commands.md; the scripts in examples/ to examples.md;
+public names that python.md does not place to its end.
+"""
+
+import ast
 import inspect
 import re
 from pathlib import Path
@@ -8,7 +13,10 @@ from typing import Any
 import typer
 from sphinx.application import Sphinx
 
+import palpate
 from palpate.cli import app
+
+HERE = Path(__file__).parent
 
 
 def _commands(command: Any, path: str) -> list[tuple[str, Any]]:
@@ -58,7 +66,7 @@ def _row(parameter: Any) -> str:
     return f"| {names} | {text} | {shown} |"
 
 
-def reference() -> str:
+def commands(_page: str) -> str:
     """The commands in Markdown, a section each."""
     parts = []
     for path, command in _commands(typer.main.get_command(app), "palpate"):
@@ -74,9 +82,40 @@ def reference() -> str:
     return "\n".join(parts)
 
 
+def examples(_page: str) -> str:
+    """The scripts in examples/, a section each."""
+    parts = []
+    for script in sorted((HERE.parent / "examples").glob("*.py")):
+        about = ast.get_docstring(ast.parse(script.read_text()))
+        if about is None:
+            raise ValueError(f"{script} does not say what it is about")
+        parts += [
+            f"## {script.name}\n",
+            f"{about}\n",
+            f"```{{literalinclude}} ../examples/{script.name}\n:language: python\n:lines: 2-\n```\n",
+        ]
+    return "\n".join(parts)
+
+
+def names_left(page: str) -> str:
+    """Public names that the page does not place."""
+    placed = set(re.findall(r"^\.\. auto\w+:: (\w+)$", page, re.MULTILINE))
+    left = [each for each in palpate.__all__ if each not in placed and not each.startswith("_")]
+    if not left:
+        return ""
+    lines = [
+        f".. auto{'class' if inspect.isclass(getattr(palpate, each)) else 'function'}:: {each}"
+        for each in left
+    ]
+    return "## Others\n\n```{eval-rst}\n" + "\n".join(lines) + "\n```\n"
+
+
+_ADDED = {"commands": commands, "examples": examples, "python": names_left}
+
+
 def _append(_app: Sphinx, page: str, source: list[str]) -> None:
-    if page == "commands":
-        source[0] += "\n" + reference()
+    if page in _ADDED:
+        source[0] += "\n" + _ADDED[page](source[0])
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
