@@ -89,11 +89,8 @@ def examples(_page: str) -> str:
         about = ast.get_docstring(ast.parse(script.read_text()))
         if about is None:
             raise ValueError(f"{script} does not say what it is about")
-        parts += [
-            f"## {script.name}\n",
-            f"{about}\n",
-            f"```{{literalinclude}} ../examples/{script.name}\n:language: python\n:lines: 2-\n```\n",
-        ]
+        shown = f"{{literalinclude}} ../examples/{script.name}\n:language: python\n:lines: 2-"
+        parts += [f"## {script.name}\n", f"{about}\n", f"```{shown}\n```\n"]
     return "\n".join(parts)
 
 
