@@ -163,6 +163,14 @@ def test_the_surface_of_a_label_has_no_steps(spacing):
     assert np.abs(away - 0.014).max() < 0.5e-3 * max(np.abs(spacing))
 
 
+def test_a_few_voxels_keep_their_volume():
+    image = np.zeros((5, 5, 5), dtype=int)
+    for count, voxel in enumerate([(2, 2, 2), (3, 2, 2), (2, 3, 2), (2, 2, 3)], 1):
+        image[voxel] = 1
+        surface = palpate.label_surface(image, affine=np.eye(4))
+        assert surface.volume == pytest.approx(count, rel=1e-3)
+
+
 def test_nets_stay_closed_around_any_voxels():
     rng = np.random.default_rng(7)
     for density in (0.02, 0.3, 0.7, 1.0):

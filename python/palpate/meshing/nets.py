@@ -18,8 +18,8 @@ from palpate._arrays import Float64Array, IndexArray
 MEMBRANE_ROUNDS, PLATE_ROUNDS = 15, 150
 #: Step of a plate's round; stable below 1/2.
 PLATE_STEP = 0.4
-#: Rounds that give back the volume that relaxation took.
-GROWTH_ROUNDS = 4
+#: Most rounds that give back the volume that relaxation took, and what part of it may be missing.
+GROWTH_ROUNDS, GROWTH_ERROR = 20, 1e-7
 
 
 def surface_net(
@@ -135,6 +135,8 @@ def _grown(
         a, b, c = (places[corner] for corner in triangles.T)
         vectors = np.cross(b - a, c - a) / 2
         volume = float(np.sum((a + b + c) * vectors) / 9)
+        if abs(wanted - volume) <= GROWTH_ERROR * wanted:
+            break
         area = float(np.linalg.norm(vectors, axis=1).sum())
         normals = np.zeros_like(places)
         for corner in triangles.T:
