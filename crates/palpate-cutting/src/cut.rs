@@ -137,7 +137,8 @@ fn sheet_by_sheet(
     if !bounds.intersects(&blade.bounds()) {
         return Ok(None);
     }
-    let min_volume = options.min_piece * mesh.volume() / mesh.tetrahedra().len() as f64;
+    let volume = mesh.volume();
+    let min_volume = options.min_piece * volume / mesh.tetrahedra().len() as f64;
     let limits = Limits { options: *options, min_volume, keeps_pending };
     let mut draft = Draft::new(mesh, positions, pending);
     let mut total: Option<SheetCut> = None;
@@ -148,7 +149,7 @@ fn sheet_by_sheet(
         }
     }
     match total {
-        Some(total) => finish(mesh, draft, total).map(Some),
+        Some(total) => finish(mesh, volume, draft, total).map(Some),
         None => Ok(None),
     }
 }
@@ -245,7 +246,8 @@ fn cut_by_sheet<'a>(
     Some((next, done))
 }
 
-fn finish(mesh: &Mesh, draft: Draft, total: SheetCut) -> Result<Cut, CutError> {
+/// `volume` [m³] is that of `mesh`.
+fn finish(mesh: &Mesh, volume: f64, draft: Draft, total: SheetCut) -> Result<Cut, CutError> {
     let old = mesh.tetrahedra();
     let mut was_split = vec![false; old.len()];
     for &parent in &draft.parents[old.len()..] {
@@ -254,18 +256,28 @@ fn finish(mesh: &Mesh, draft: Draft, total: SheetCut) -> Result<Cut, CutError> {
     let Draft { tetrahedra, parents, origins, rest, positions, pending, .. } = draft;
     let change = MeshChange::new(mesh, rest, tetrahedra, origins, parents)?;
     let new = &change.mesh;
-    let parts = (0..change.tetrahedra.len())
-        .filter(|&part| was_split[change.tetrahedra[part] as usize])
-        .map(|part| tetrahedron::radius_ratio(&new.tetrahedron_corners(part)));
+    let (mut smallest_quality, mut gained) = (None, 0.0);
+    for (part, &parent) in change.tetrahedra.iter().enumerate() {
+        if was_split[parent as usize] {
+            let corners = new.tetrahedron_corners(part);
+            let quality = tetrahedron::radius_ratio(&corners);
+            smallest_quality = Some(smallest_quality.map_or(quality, |least| quality.min(least)));
+            gained += tetrahedron::signed_volume(&corners);
+        }
+    }
+    let split = || (0..old.len()).filter(|&parent| was_split[parent]);
+    for parent in split() {
+        gained -= tetrahedron::signed_volume(&mesh.tetrahedron_corners(parent));
+    }
     let report = CutReport {
         new_nodes: new.nodes().len() - mesh.nodes().len(),
         new_tetrahedra: new.tetrahedra().len() - old.len(),
-        split_tetrahedra: was_split.iter().filter(|&&split| split).count(),
+        split_tetrahedra: split().count(),
         snapped_nodes: total.snapped,
         pieces_before: piece_count(mesh),
         pieces: piece_count(new),
-        smallest_quality: parts.min_by(f64::total_cmp),
-        volume_change: new.volume() / mesh.volume() - 1.0,
+        smallest_quality,
+        volume_change: gained / volume,
         cut_area: total.area,
         deviation: total.deviation,
     };

@@ -103,12 +103,28 @@ impl Mesh {
         Ok((Self::from_checked(data), report))
     }
 
+    /// The mesh that `data` makes, where all tetrahedra but the changed ones are those of this mesh, with the same numbers, rest
+    /// positions and neighbours: the same as [`Mesh::new`], looking only at what has changed.
+    fn after_change(&self, mut data: MeshData, is_changed: &[bool]) -> Result<Self, MeshError> {
+        check::check_arrays(&mut data)?;
+        check::check_changed(&data, is_changed)?;
+        let before = (self.triangles(), self.triangle_owners());
+        let (triangles, triangle_owners) =
+            surface::boundary_faces_after(before, &data.tetrahedra, is_changed, data.nodes.len());
+        data.triangles = triangles;
+        Ok(Self::with_surface(data, triangle_owners))
+    }
+
     fn from_checked(mut data: MeshData) -> Self {
         let mut triangle_owners = Vec::new();
         if !data.tetrahedra.is_empty() {
             (data.triangles, triangle_owners) =
                 surface::boundary_faces(&data.tetrahedra, data.nodes.len());
         }
+        Self::with_surface(data, triangle_owners)
+    }
+
+    fn with_surface(data: MeshData, triangle_owners: Vec<u32>) -> Self {
         let surface_nodes = surface::used_nodes(&data.triangles, data.nodes.len());
         let (surface_edges, triangle_edges) = surface::edges(&data.triangles);
         Self { data, triangle_owners, surface_nodes, surface_edges, triangle_edges }

@@ -83,3 +83,30 @@ fn a_kidney_cut_step_by_step_opens_as_deep_as_by_one_stroke() {
         assert!(halves.iter().all(|half| half.len() > 2000), "{length}");
     }
 }
+
+/// With `PALPATE_DATA`, meshes of real organs.
+#[test]
+fn planes_through_real_organs() {
+    let Some(folder) = std::env::var_os("PALPATE_DATA") else {
+        return;
+    };
+    let mut random = Random(4);
+    let mut organs = 0;
+    for entry in std::fs::read_dir(Path::new(&folder).join("organs")).unwrap() {
+        let path = entry.unwrap().path();
+        let Ok(read) = read_mesh(&path, &ReadOptions { repair: true }) else {
+            continue;
+        };
+        let mesh = read.mesh;
+        if mesh.is_surface_only() {
+            continue;
+        }
+        organs += 1;
+        for _ in 0..3 {
+            let normal = [0; 3].map(|_| random.between(-1.0, 1.0));
+            let blade = Blade::plane(mesh.bounds().center(), normal, None).unwrap();
+            checked_cut(&mesh, mesh.nodes(), &blade, &CutOptions::default()).unwrap();
+        }
+    }
+    assert!(organs > 0);
+}

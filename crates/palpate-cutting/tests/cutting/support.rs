@@ -207,6 +207,8 @@ fn check_conformity(old: &Mesh, cut: &Cut) {
     let change = &cut.change;
     let new = &change.mesh;
     assert_no_face_is_shared_by_three(new);
+    // Looking only at what has changed finds the surface that all tetrahedra have.
+    assert_eq!(**new, Mesh::new((**new).clone().into_data()).unwrap());
     let mut old_of: BTreeMap<u32, Vec<[u32; 3]>> = BTreeMap::new();
     for (triangle, &owner) in old.triangles().iter().zip(old.triangle_owners()) {
         old_of.entry(owner).or_default().push(*triangle);

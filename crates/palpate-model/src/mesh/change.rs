@@ -86,14 +86,18 @@ impl MeshChange {
         let sets = old.node_sets().iter();
         let regions = old.regions();
         let follow = |values: &Vec<Point>| of_parents(values, &tetrahedra);
-        let mesh = Mesh::new(MeshData {
+        let data = MeshData {
             node_sets: sets.map(|(name, set)| (name.clone(), node_set(&nodes, set))).collect(),
             regions: of_parents(regions, &tetrahedra),
             fibres: old.fibres().each_ref().map(follow),
             nodes: positions,
             tetrahedra: corners,
             triangles: Vec::new(),
-        })?;
+        };
+        let mesh = match changed_tetrahedra(old, &data, &tetrahedra) {
+            Some(is_changed) => old.after_change(data, &is_changed)?,
+            None => Mesh::new(data)?,
+        };
         Ok(Self { mesh: Arc::new(mesh), nodes, tetrahedra })
     }
 
@@ -187,6 +191,34 @@ impl MeshChange {
         }
         Some(result)
     }
+}
+
+/// Of each tetrahedron whether it, or one that it shares or shared a face with, is not what it was; `None` where old nodes have
+/// moved or old tetrahedra have other numbers.
+fn changed_tetrahedra(old: &Mesh, data: &MeshData, parents: &[u32]) -> Option<Vec<bool>> {
+    let old_tetrahedra = old.tetrahedra();
+    let keeps_nodes = data.nodes.get(..old.nodes().len()) == Some(old.nodes());
+    let keeps_tetrahedra = !old_tetrahedra.is_empty()
+        && parents.len() >= old_tetrahedra.len()
+        && (0..).zip(&parents[..old_tetrahedra.len()]).all(|(index, &parent)| index == parent);
+    if !keeps_nodes || !keeps_tetrahedra {
+        return None;
+    }
+    let mut is_near = vec![false; data.nodes.len()];
+    for (index, corners) in data.tetrahedra.iter().enumerate() {
+        let before = old_tetrahedra.get(index);
+        if before != Some(corners) {
+            for &node in corners.iter().chain(before.into_iter().flatten()) {
+                // What is out of range is refused later.
+                if let Some(is_near) = is_near.get_mut(node as usize) {
+                    *is_near = true;
+                }
+            }
+        }
+    }
+    let is_near = |node: &&u32| is_near.get(**node as usize).is_none_or(|&is_near| is_near);
+    let is_changed = |corners: &[u32; 4]| corners.iter().filter(is_near).count() >= 3;
+    Some(data.tetrahedra.iter().map(is_changed).collect())
 }
 
 fn of_parents<T: Copy>(values: &[T], parents: &[u32]) -> Vec<T> {
@@ -308,6 +340,51 @@ mod tests {
             ..MeshData::default()
         };
         Arc::new(Mesh::repaired(data).unwrap().0)
+    }
+
+    proptest! {
+        #[test]
+        fn what_has_changed_is_enough_to_look_at(
+            count in 1_u32..8,
+            replaced in proptest::collection::vec((0_usize..12, proptest::array::uniform4(0_u32..13)), 0..6),
+        ) {
+            let old = row(count);
+            let mut corners = old.tetrahedra().to_vec();
+            let mut parents: Vec<u32> = (0..count).collect();
+            let mut positions = old.nodes().to_vec();
+            positions.extend([[5.0, 4.0, 3.0], [-3.0, 5.0, 4.0]]);
+            for (place, nodes) in replaced {
+                // Most are in range and turned right.
+                let mut nodes = nodes.map(|node| node % (positions.len() as u32 + u32::from(node == 12)));
+                let at = |node: u32| positions.get(node as usize).map_or(DVec3::ZERO, |&p| p.into());
+                let [a, b, c, d] = nodes.map(at);
+                if (b - a).cross(c - a).dot(d - a) < 0.0 {
+                    nodes.swap(2, 3);
+                }
+                let place = place.min(corners.len());
+                if place == corners.len() {
+                    corners.push(nodes);
+                    parents.push(0);
+                } else {
+                    corners[place] = nodes;
+                }
+            }
+            let nodes = vec![NodeOrigin::kept(0); positions.len()];
+            let found = MeshChange::new(&old, positions.clone(), corners.clone(), nodes.clone(), parents.clone());
+            let data = MeshData { nodes: positions, tetrahedra: corners, ..MeshData::default() };
+            let expected = Mesh::new(data);
+            match (found, expected) {
+                (Ok(found), Ok(expected)) => {
+                    prop_assert_eq!(found.mesh.triangles(), expected.triangles());
+                    prop_assert_eq!(found.mesh.triangle_owners(), expected.triangle_owners());
+                    prop_assert_eq!(found.mesh.surface_edges(), expected.surface_edges());
+                    prop_assert_eq!(found.mesh.surface_nodes(), expected.surface_nodes());
+                }
+                (found, expected) => {
+                    prop_assert_eq!(found.err(), expected.err());
+                }
+            }
+        }
     }
 
     #[test]

@@ -155,6 +155,23 @@ pub(super) fn check_orientations(
     Ok(())
 }
 
+/// Refuses what is wrong with changed tetrahedra; the others are known to be right.
+pub(super) fn check_changed(data: &MeshData, is_changed: &[bool]) -> Result<(), MeshError> {
+    let changed = || (0..data.tetrahedra.len()).filter(|&index| is_changed[index]);
+    let is_right = |index| orientation(&data.nodes, &data.tetrahedra[index]) > 0;
+    if !changed().all(is_right) {
+        // For the whole list of those that are wrong.
+        check_orientations(&data.nodes, &data.tetrahedra)?;
+    }
+    let mut is_near = vec![false; data.nodes.len()];
+    for node in changed().flat_map(|index| data.tetrahedra[index]) {
+        is_near[node as usize] = true;
+    }
+    let is_near = |nodes: &&[u32; 4]| nodes.iter().all(|&node| is_near[node as usize]);
+    let near: Vec<[u32; 4]> = data.tetrahedra.iter().filter(is_near).copied().collect();
+    if duplicates(&near, data.nodes.len()).is_empty() { Ok(()) } else { check_duplicates(data) }
+}
+
 /// Refuses elements with the same nodes as an earlier one.
 pub(super) fn check_duplicates(data: &MeshData) -> Result<(), MeshError> {
     let tetrahedra = duplicates(&data.tetrahedra, data.nodes.len());

@@ -80,6 +80,64 @@ pub(super) fn boundary_faces(
     (triangles, boundary.iter().map(|&face| face / 4).collect())
 }
 
+/// The same after some tetrahedra have changed, from the faces `before` of those that have not, in tetrahedron order.
+///
+/// Tetrahedra that share a face with a changed one must have kept it or have changed as well.
+pub(super) fn boundary_faces_after(
+    before: (&[[u32; 3]], &[u32]),
+    tetrahedra: &[[u32; 4]],
+    is_changed: &[bool],
+    node_count: usize,
+) -> (Vec<[u32; 3]>, Vec<u32>) {
+    let mut is_near = vec![false; node_count];
+    for (nodes, _) in tetrahedra.iter().zip(is_changed).filter(|(_, changed)| **changed) {
+        for &node in nodes {
+            is_near[node as usize] = true;
+        }
+    }
+    // A face and its number in one, which sorts fastest.
+    let mut keyed: Vec<u128> = Vec::new();
+    for (tetrahedron, nodes) in (0..).zip(tetrahedra) {
+        if nodes.iter().filter(|&&node| is_near[node as usize]).count() < 3 {
+            continue;
+        }
+        for face in 4 * tetrahedron..4 * tetrahedron + 4 {
+            let [smallest, middle, largest] = sorted_face(tetrahedra, face);
+            if [smallest, middle, largest].iter().all(|&node| is_near[node as usize]) {
+                let nodes = u128::from(smallest) << 64 | u128::from(middle) << 32;
+                keyed.push((nodes | u128::from(largest)) << 32 | u128::from(face));
+            }
+        }
+    }
+    keyed.sort_unstable();
+    let mut found: Vec<u32> = keyed
+        .chunk_by(|left, right| left >> 32 == right >> 32)
+        .filter(|same| same.len() == 1)
+        .map(|same| same[0] as u32)
+        .filter(|&face| is_changed[face as usize / 4])
+        .collect();
+    found.sort_unstable();
+
+    let (triangles, owners) = before;
+    let mut kept = (triangles.iter().zip(owners))
+        .filter(|&(_, &owner)| !is_changed[owner as usize])
+        .map(|(&triangle, &owner)| (triangle, owner))
+        .peekable();
+    let mut merged = (Vec::new(), Vec::new());
+    let mut push = |(triangle, owner): ([u32; 3], u32)| {
+        merged.0.push(triangle);
+        merged.1.push(owner);
+    };
+    for face in found {
+        while let Some(earlier) = kept.next_if(|&(_, owner)| owner < face / 4) {
+            push(earlier);
+        }
+        push((face_nodes(tetrahedra, face), face / 4));
+    }
+    kept.for_each(push);
+    merged
+}
+
 /// Sorted indices of the nodes that some triangle uses.
 pub(super) fn used_nodes(triangles: &[[u32; 3]], node_count: usize) -> Vec<u32> {
     let mut used = vec![false; node_count];
