@@ -18,7 +18,7 @@ fn examples(page: &str, language: &str) -> Vec<String> {
 #[test]
 fn every_model_in_the_language_page_is_one() {
     let models = examples("language.md", "bml");
-    assert_eq!(models.len(), 4);
+    assert_eq!(models.len(), 5);
     for text in &models {
         let parsed = Document::parse(text, Path::new("language.md"));
         let document = parsed.unwrap_or_else(|error| panic!("{error}"));
