@@ -172,7 +172,9 @@ impl Tissue {
         }
         let averages = |law: &Law| {
             let Lame { mu, lambda } = law.lame();
-            input.averaging == VolumeAveraging::Automatic && lambda > STIFF_RATIO * mu
+            // Rounding must not decide for nu = 0.45 itself.
+            let limit = (1.0 + 1e-9) * STIFF_RATIO * mu;
+            input.averaging == VolumeAveraging::Automatic && lambda > limit
         };
         let mut layout = Layout::default();
         let mut batches = Vec::new();

@@ -60,7 +60,7 @@ fn stack(friction: f64) -> World {
 fn a_step_at_rest_allocates_nothing() {
     for friction in [0.0, 0.4] {
         let mut world = stack(friction);
-        world.run(120);
+        world.run(200);
         for _ in 0..30 {
             let before = ALLOCATIONS.load(Ordering::Relaxed);
             world.dynamics.begin_step();

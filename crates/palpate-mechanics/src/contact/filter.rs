@@ -11,11 +11,16 @@ use super::{ContactParameters, Surface, side};
 
 /// Slack in the tests of direction: a flat surface must not lose its contacts to round-off.
 const ANGLE_SLACK: f64 = 1e-6;
+/// The same for a pair that carried a force in the last step: where pushing and letting go turn the
+/// surfaces to and fro across a limit, a pair would come and go for ever and the bodies never rest.
+const LOADED_SLACK: f64 = 0.05;
 /// A node whose own surface faces away from the other body by more than this does not touch it.
 const FACING_LIMIT: f64 = 0.2;
 /// Edge pairs count only where both edges are sharper than this (sine of the angle between the
 /// faces): on smooth surfaces nodes against triangles do, up to a small part of the contact distance.
 const SHARP_EDGE: f64 = 0.25;
+/// The same for a pair that carried a force in the last step.
+const LOADED_SHARP_EDGE: f64 = 0.125;
 /// Elements of one body closer than this at rest, in contact distances, do not push each other.
 const REST_NEIGHBOUR: f64 = 2.0;
 /// A node behind its own body's surface has passed through it when the two were this many times
@@ -87,11 +92,13 @@ impl Filter {
     }
 
     /// Adds the contact candidates of this step, in the order of the pairs, then of the penetrations.
+    /// `is_loaded` tells which pairs carried a force in the last step.
     pub(crate) fn run<'a>(
         &mut self,
         proximity: &[ProximityPair],
         penetration: &[PenetratingNode],
         view: impl Fn(u32) -> BodyView<'a>,
+        is_loaded: impl Fn(&ProximityPair) -> bool,
         time_step: f64,
         candidates: &mut Vec<Candidate>,
     ) {
@@ -107,8 +114,8 @@ impl Filter {
                 continue;
             }
             let gap = match pair.kind {
-                PairKind::VertexTriangle => self.vertex_triangle(pair, bodies),
-                PairKind::EdgeEdge => edge_edge(pair, bodies),
+                PairKind::VertexTriangle => self.vertex_triangle(pair, bodies, is_loaded(pair)),
+                PairKind::EdgeEdge => edge_edge(pair, bodies, is_loaded(pair)),
             };
             if let Some((gap, normal)) = gap {
                 let area = match pair.kind {
@@ -191,7 +198,9 @@ impl Filter {
         &self,
         pair: &ProximityPair,
         [own, other]: [BodyView<'_>; 2],
+        is_loaded: bool,
     ) -> Option<(f64, DVec3)> {
+        let slack = if is_loaded { LOADED_SLACK } else { ANGLE_SLACK };
         let key = (pair.bodies[0], pair.nodes[0], pair.bodies[1]);
         if self.inside.binary_search(&key).is_ok() {
             return None;
@@ -208,7 +217,8 @@ impl Filter {
                 let edge = other.surface.mesh().triangle_edges()[triangle as usize][(zero + 1) % 3];
                 let triangles = other.surface.edge_triangles(edge);
                 let from = other.at(corners[(zero + 1) % 3]);
-                let away = |&(_, node): &(u32, u32)| leads_away(other.at(node) - from, normal);
+                let away =
+                    |&(_, node): &(u32, u32)| leads_away(other.at(node) - from, normal, slack);
                 if triangles[0].0 != triangle || (gap > 0.0 && !triangles.iter().all(away)) {
                     return None;
                 }
@@ -217,7 +227,7 @@ impl Filter {
             _ => {
                 let corner = corners[weights.iter().position(|&weight| weight != 0.0)?];
                 let from = other.at(corner);
-                let away = |&node: &u32| leads_away(other.at(node) - from, normal);
+                let away = |&node: &u32| leads_away(other.at(node) - from, normal, slack);
                 if other.surface.node_triangles(corner)[0] != triangle
                     || (gap > 0.0 && !other.surface.node_neighbours(corner).iter().all(away))
                 {
@@ -260,7 +270,13 @@ impl Filter {
 }
 
 /// Gap and normal of an edge against an edge, if the pair is a contact.
-fn edge_edge(pair: &ProximityPair, [own, other]: [BodyView<'_>; 2]) -> Option<(f64, DVec3)> {
+fn edge_edge(
+    pair: &ProximityPair,
+    [own, other]: [BodyView<'_>; 2],
+    is_loaded: bool,
+) -> Option<(f64, DVec3)> {
+    let (slack, sharp_edge) =
+        if is_loaded { (LOADED_SLACK, LOADED_SHARP_EDGE) } else { (ANGLE_SLACK, SHARP_EDGE) };
     if pair.weights.contains(&0.0) {
         return None;
     }
@@ -268,12 +284,12 @@ fn edge_edge(pair: &ProximityPair, [own, other]: [BodyView<'_>; 2]) -> Option<(f
     let inside_cone = |body: &BodyView<'_>, edge: u32, from: u32, direction: DVec3| {
         let triangles = body.surface.edge_triangles(edge);
         let from = body.at(from);
-        let away = |&(_, node): &(u32, u32)| leads_away(body.at(node) - from, direction);
+        let away = |&(_, node): &(u32, u32)| leads_away(body.at(node) - from, direction, slack);
         let convex = match triangles {
             [(first, _), (second, _)] => {
                 let first = body.surface.triangle_normal(*first, body.positions);
                 let second = body.surface.triangle_normal(*second, body.positions);
-                let sharp = first.cross(second).length() > SHARP_EDGE || first.dot(second) < 0.0;
+                let sharp = first.cross(second).length() > sharp_edge || first.dot(second) < 0.0;
                 // Behind the edge of a closed surface is the inside of the body.
                 sharp && (!body.surface.is_closed() || (first + second).dot(direction) > 0.0)
             }
@@ -290,8 +306,8 @@ fn edge_edge(pair: &ProximityPair, [own, other]: [BodyView<'_>; 2]) -> Option<(f
 }
 
 /// True when going along `step` does not come closer to a point in direction `normal`.
-fn leads_away(step: DVec3, normal: DVec3) -> bool {
-    step.dot(normal) <= ANGLE_SLACK * step.length()
+fn leads_away(step: DVec3, normal: DVec3, slack: f64) -> bool {
+    step.dot(normal) <= slack * step.length()
 }
 
 /// Distance between the two contact points when the body is at rest [m].
@@ -327,5 +343,66 @@ fn candidate(
         recovery: gap + distance * time_step / RECOVERY_TIME,
         friction: a.friction(b),
         tied: None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use palpate_model::{Body, Mesh, MeshData};
+
+    use super::*;
+
+    /// A tetrahedron with an edge from `a` to `b` whose faces fall off to `c` and `d`.
+    fn roof(nodes: [Point; 4]) -> Body {
+        let mut data = MeshData { nodes: nodes.to_vec(), ..MeshData::default() };
+        let [a, b, c, d] = nodes.map(DVec3::from_array);
+        let upright = (b - a).cross(c - a).dot(d - a) > 0.0;
+        data.tetrahedra.push(if upright { [0, 1, 2, 3] } else { [0, 1, 3, 2] });
+        Body::new("roof", Arc::new(Mesh::new(data).unwrap()))
+    }
+
+    /// Whether two roofs with a slope of `slope` touch with their edges, crosswise.
+    fn edges_touch(slope: f64, is_loaded: bool) -> bool {
+        let below =
+            roof([[0.0, -1.0, 0.0], [0.0, 1.0, 0.0], [-1.0, 0.0, -slope], [1.0, 0.0, -slope]]);
+        let above = roof([
+            [-1.0, 0.0, 0.01],
+            [1.0, 0.0, 0.01],
+            [0.0, -1.0, 0.01 + slope],
+            [0.0, 1.0, 0.01 + slope],
+        ]);
+        let bodies = [above, below];
+        let surfaces = bodies.each_ref().map(|body| Surface::new(&body.mesh));
+        let parameters = bodies.each_ref().map(|body| ContactParameters::new(0, body).unwrap());
+        let edge = |body: usize| {
+            let edges = bodies[body].mesh.surface_edges();
+            edges.iter().position(|edge| edge.contains(&0) && edge.contains(&1)).unwrap() as u32
+        };
+        let pair = ProximityPair {
+            kind: PairKind::EdgeEdge,
+            bodies: [0, 1],
+            elements: [edge(0), edge(1)],
+            nodes: [0, 1, 0, 1],
+            weights: [0.5, 0.5, -0.5, -0.5],
+            normal: [0.0, 0.0, 1.0],
+            distance: 0.01,
+        };
+        let view = |body: u32| BodyView {
+            surface: &surfaces[body as usize],
+            parameters: &parameters[body as usize],
+            positions: bodies[body as usize].mesh.nodes(),
+        };
+        let mut candidates = Vec::new();
+        Filter::default().run(&[pair], &[], view, |_| is_loaded, 0.01, &mut candidates);
+        !candidates.is_empty()
+    }
+
+    #[test]
+    fn a_pair_that_bears_a_force_is_not_dropped_at_the_limit_where_it_began() {
+        assert!(edges_touch(0.2, false) && edges_touch(0.2, true));
+        assert!(!edges_touch(0.1, false) && edges_touch(0.1, true));
+        assert!(!edges_touch(0.03, false) && !edges_touch(0.03, true));
     }
 }

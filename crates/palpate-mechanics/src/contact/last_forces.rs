@@ -1,7 +1,7 @@
 //! The contact forces of the last step: where the next solve begins and what motion to expect.
 
 use glam::DVec3;
-use palpate_contact::PairKind;
+use palpate_contact::{PairKind, ProximityPair};
 
 use super::filter::Candidate;
 use crate::state::ContactForce;
@@ -40,11 +40,19 @@ impl LastForces {
 
     /// Force on side a of a candidate [N]; zero if it did not touch.
     pub(crate) fn force_of(&self, candidate: &Candidate) -> DVec3 {
-        let wanted = (candidate.kind == PairKind::EdgeEdge, candidate.bodies, candidate.nodes);
+        let place = self.find(candidate.kind, candidate.bodies, candidate.nodes);
+        place.map_or(DVec3::ZERO, |place| DVec3::from_array(self.forces[place].force))
+    }
+
+    /// Whether a pair touched.
+    pub(crate) fn holds(&self, pair: &ProximityPair) -> bool {
+        self.find(pair.kind, pair.bodies, pair.nodes).is_some()
+    }
+
+    fn find(&self, kind: PairKind, bodies: [u32; 2], nodes: [u32; 4]) -> Option<usize> {
+        let wanted = (kind == PairKind::EdgeEdge, bodies, nodes);
         let place =
             self.order.binary_search_by_key(&wanted, |&place| key(&self.forces[place as usize]));
-        place.map_or(DVec3::ZERO, |place| {
-            DVec3::from_array(self.forces[self.order[place] as usize].force)
-        })
+        place.ok().map(|place| self.order[place] as usize)
     }
 }

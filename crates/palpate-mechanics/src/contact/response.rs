@@ -59,7 +59,9 @@ impl Response {
         view: impl Fn(usize) -> BodyView<'a>,
     ) {
         let view = |body: u32| view(body as usize);
-        self.filter.run(proximity, penetration, view, time_step, &mut self.candidates);
+        let (last, candidates) = (&self.last, &mut self.candidates);
+        let is_loaded = |pair: &ProximityPair| last.holds(pair);
+        self.filter.run(proximity, penetration, view, is_loaded, time_step, candidates);
         self.spare.clear();
         let spare = &mut self.spare;
         self.candidates.retain(|candidate| {
