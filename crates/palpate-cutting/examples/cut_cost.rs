@@ -1,4 +1,5 @@
-//! What cuts of a mesh cost and how good they are: `cargo run --release --example cut_cost -- models/kidney.seg`.
+//! What cuts of a mesh cost and how good they are: `cargo run --release --example cut_cost --
+//! models/kidney.seg`.
 
 use std::error::Error;
 use std::path::Path;
@@ -65,8 +66,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     step_by_step(&mesh)
 }
 
-/// A stroke of many steps, each a blade of its own, as a tool moves: most do nothing, as the tetrahedra they reach are cut
-/// already.
+/// A stroke of many steps, each a blade of its own, as a tool moves: most do nothing, as the
+/// tetrahedra they reach are cut already.
 #[allow(clippy::print_stdout)]
 fn step_by_step(mesh: &Mesh) -> Result<(), Box<dyn Error>> {
     let (center, extent) = (mesh.bounds().center(), mesh.bounds().extent());

@@ -110,13 +110,13 @@ pub enum BladeError {
 impl Blade {
     /// The surface of triangles with corners in `points` [m].
     ///
-    /// Points at the same place are one. Triangles are turned to agree with their neighbours, so their
-    /// order of corners does not matter. Where more than two share an edge, or neighbours are folded
-    /// back sharply, the surface is taken apart into sheets that cut one after the other.
+    /// Points at the same place are one. Triangles are turned to agree with their neighbours, so
+    /// their order of corners does not matter. Where more than two share an edge, or neighbours are
+    /// folded back sharply, the surface is taken apart into sheets that cut one after the other.
     ///
     /// # Errors
-    /// If there is no triangle, one has no area or an index out of range, a point is not finite, or the
-    /// surface has one side only.
+    /// If there is no triangle, one has no area or an index out of range, a point is not finite, or
+    /// the surface has one side only.
     pub fn new(points: &[Point], triangles: &[[u32; 3]]) -> Result<Self, BladeError> {
         check_finite(points)?;
         if triangles.is_empty() {
@@ -137,9 +137,9 @@ impl Blade {
         Self::from_triangles(points, triangles)
     }
 
-    /// The strip that an edge sweeps from each of its places to the next: a scalpel. `edges` [m] has
-    /// at least two of them; places where it stood still or moved along itself sweep nothing. A strip that comes
-    /// back to its first edge is a closed tube.
+    /// The strip that an edge sweeps from each of its places to the next: a scalpel. `edges` [m]
+    /// has at least two of them; places where it stood still or moved along itself sweep nothing. A
+    /// strip that comes back to its first edge is a closed tube.
     ///
     /// # Errors
     /// If there are fewer than two edges, one is not finite, or nothing is swept.
@@ -171,8 +171,8 @@ impl Blade {
         Self::from_triangles(points, &triangles)
     }
 
-    /// The square of edge length `size` [m] around `point` [m], orthogonal to `normal` (of any length);
-    /// without a size, the whole plane.
+    /// The square of edge length `size` [m] around `point` [m], orthogonal to `normal` (of any
+    /// length); without a size, the whole plane.
     ///
     /// # Errors
     /// If something is not finite, the normal is zero, or the size is not positive.
@@ -195,12 +195,12 @@ impl Blade {
         Self::new(&points, &[[0, 1, 2], [0, 2, 3]])
     }
 
-    /// The surface that a closed line spans, flat or not: `points` [m] in order, the last joined to the
-    /// first.
+    /// The surface that a closed line spans, flat or not: `points` [m] in order, the last joined to
+    /// the first.
     ///
     /// # Errors
-    /// If there are fewer than three different points, one is not finite, they span no area, or the line
-    /// crosses itself, seen along its mean normal.
+    /// If there are fewer than three different points, one is not finite, they span no area, or the
+    /// line crosses itself, seen along its mean normal.
     pub fn closed_loop(points: &[Point]) -> Result<Self, BladeError> {
         const WHAT: &str = "points of the loop";
         check_finite(points)?;
@@ -216,8 +216,9 @@ impl Blade {
         Self::from_triangles(points, &triangles)
     }
 
-    /// Several blades as one, cutting in this order. Surfaces that share points along their borders, as a tube and its cap,
-    /// become one sheet; whole planes stay apart and must be cut on their own.
+    /// Several blades as one, cutting in this order. Surfaces that share points along their
+    /// borders, as a tube and its cap, become one sheet; whole planes stay apart and must be cut on
+    /// their own.
     ///
     /// # Errors
     /// If there is none, or one is a whole plane, or the sum has one side only.
@@ -258,7 +259,8 @@ impl Blade {
         sheets.iter().flatten().copied()
     }
 
-    /// The parts that cut one after the other, each as a blade: separate, branching or folded back sheets.
+    /// The parts that cut one after the other, each as a blade: separate, branching or folded back
+    /// sheets.
     pub fn parts(&self) -> Vec<Self> {
         match &self.0 {
             Shape::Surface { points, sheets } => {

@@ -94,8 +94,8 @@ fn meeting(corners: &[Point; 4], triangle: &[Point; 3], normal: Point) -> Meetin
     Meeting::None
 }
 
-/// Whether the tetrahedron lies beside the triangle, outside of one of its edges as seen along its normal: most of
-/// those near a long thin triangle do.
+/// Whether the tetrahedron lies beside the triangle, outside of one of its edges as seen along its
+/// normal: most of those near a long thin triangle do.
 fn is_beside(corners: &[Point; 4], triangle: &[Point; 3], normal: Point) -> bool {
     (0..3).any(|side| {
         let [from, to] = [triangle[side], triangle[(side + 1) % 3]];
@@ -104,8 +104,9 @@ fn is_beside(corners: &[Point; 4], triangle: &[Point; 3], normal: Point) -> bool
     })
 }
 
-/// Whether a point of the triangle is strictly inside: the middle of what clipping leaves of it, tested exactly.
-/// Overlaps as thin as rounding may be missed, which leaves one tetrahedron uncut at the sheet's border.
+/// Whether a point of the triangle is strictly inside: the middle of what clipping leaves of it,
+/// tested exactly. Overlaps as thin as rounding may be missed, which leaves one tetrahedron uncut
+/// at the sheet's border.
 fn passes_inside(corners: &[Point; 4], triangle: &[Point; 3]) -> bool {
     let [a, b, c, d] = *corners;
     let orientation = orient3d(a, b, c, d);
@@ -272,7 +273,8 @@ pub(crate) fn crossed_edges(
     found.into_iter().map(edge).collect()
 }
 
-/// Where the sheet itself crosses a segment: its parameter, of several the middle one. Beyond the border there is none.
+/// Where the sheet itself crosses a segment: its parameter, of several the middle one. Beyond the
+/// border there is none.
 fn hit(sheet: &Sheet, ends: &[Point; 2]) -> Option<f64> {
     let mut hits = Vec::new();
     sheet.for_each_near(&Aabb::from_points(ends), |triangle| {
@@ -290,9 +292,11 @@ fn hit(sheet: &Sheet, ends: &[Point; 2]) -> Option<f64> {
     hits.get(hits.len() / 2).copied()
 }
 
-/// Where a segment passes from side to side beyond the border: its parameter. Its ends have heights of different signs.
+/// Where a segment passes from side to side beyond the border: its parameter. Its ends have heights
+/// of different signs.
 ///
-/// The plane that goes on there is that of the closest triangle, which changes along the segment where the blade is bent.
+/// The plane that goes on there is that of the closest triangle, which changes along the segment
+/// where the blade is bent.
 fn beyond(sheet: &Sheet, ends: &[Point; 2], heights: [f64; 2]) -> f64 {
     const STEPS: usize = 20;
     const CLOSE: f64 = 1e-6;

@@ -15,17 +15,18 @@ use crate::split;
 /// How a cut treats what the blade nearly meets.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CutOptions {
-    /// A node closer to the blade than this part of a crossed edge counts as on the blade: the cut passes through it. In
-    /// [0, 0.5].
+    /// A node closer to the blade than this part of a crossed edge counts as on the blade: the cut
+    /// passes through it. In [0, 0.5].
     pub snap: f64,
-    /// No part of a split tetrahedron has a smaller radius ratio at rest (1 is regular), unless the whole had: its
-    /// split is refused instead, and the cut passes through its nodes. In [0, 1].
+    /// No part of a split tetrahedron has a smaller radius ratio at rest (1 is regular), unless the
+    /// whole had: its split is refused instead, and the cut passes through its nodes. In [0, 1].
     pub min_quality: f64,
-    /// No part of a split tetrahedron has a shorter edge [m] at rest, unless the whole had. With it, no number of cuts makes
-    /// more than a bounded number of tetrahedra. 0 for no bound; a tenth of a mesh's mean edge costs little accuracy.
+    /// No part of a split tetrahedron has a shorter edge [m] at rest, unless the whole had. With
+    /// it, no number of cuts makes more than a bounded number of tetrahedra. 0 for no bound; a
+    /// tenth of a mesh's mean edge costs little accuracy.
     pub min_edge: f64,
-    /// No piece comes off that has less volume at rest than this many mean tetrahedra of the mesh: it stays where it was. 0
-    /// for no bound.
+    /// No piece comes off that has less volume at rest than this many mean tetrahedra of the mesh:
+    /// it stays where it was. 0 for no bound.
     pub min_piece: f64,
 }
 
@@ -38,15 +39,15 @@ impl Default for CutOptions {
 /// A mesh after a cut.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cut {
-    /// The new mesh, and what in it was what. Old nodes and tetrahedra keep their numbers (a split one its first
-    /// part); what is new comes after them.
+    /// The new mesh, and what in it was what. Old nodes and tetrahedra keep their numbers (a split
+    /// one its first part); what is new comes after them.
     pub change: MeshChange,
     /// Present positions [m] of the new mesh's nodes.
     pub positions: Vec<Point>,
     /// What was done.
     pub report: CutReport,
-    /// Nodes of the faces of the new mesh that are cut but still hang together by all three nodes, at the front of a partial
-    /// cut: for [`cut_on`].
+    /// Nodes of the faces of the new mesh that are cut but still hang together by all three nodes,
+    /// at the front of a partial cut: for [`cut_on`].
     pub pending: Vec<[u32; 3]>,
 }
 
@@ -90,12 +91,14 @@ pub enum CutError {
 
 /// Cuts `mesh`, whose nodes are at `positions` [m] now, along `blade`, which is in that space.
 ///
-/// The result is a conforming mesh: tetrahedra that the blade passes through are split, and nodes are copied along the cut. A tetrahedron in which
-/// the blade ends is cut through, so that the cut ends at most one tetrahedron beyond the blade. `None` when the blade passes the mesh by, or nothing comes
-/// apart (it meets only the inside of a tetrahedron, or lies where a cut is already).
+/// The result is a conforming mesh: tetrahedra that the blade passes through are split, and nodes
+/// are copied along the cut. A tetrahedron in which the blade ends is cut through, so that the cut
+/// ends at most one tetrahedron beyond the blade. `None` when the blade passes the mesh by, or
+/// nothing comes apart (it meets only the inside of a tetrahedron, or lies where a cut is already).
 ///
 /// # Errors
-/// If the mesh has no tetrahedra, a position is missing or not finite, or an option is out of range.
+/// If the mesh has no tetrahedra, a position is missing or not finite, or an option is out of
+/// range.
 pub fn cut(
     mesh: &Mesh,
     positions: &[Point],
@@ -107,10 +110,11 @@ pub fn cut(
 
 /// Goes on cutting where an earlier cut ended: as [`cut`], with the `pending` faces that it left.
 ///
-/// A blade that moves in steps shorter than a tetrahedron cuts it through when it first enters, though all of its nodes
-/// may still hang together with others; without `pending` this is forgotten when the blade goes on, and bridges stay. In exchange the
-/// result may be a mesh that was only split, with pending faces and nothing open (`cut_area` is 0). Pending faces that
-/// are no longer faces between two tetrahedra are ignored; after another change of the mesh, give none.
+/// A blade that moves in steps shorter than a tetrahedron cuts it through when it first enters,
+/// though all of its nodes may still hang together with others; without `pending` this is forgotten
+/// when the blade goes on, and bridges stay. In exchange the result may be a mesh that was only
+/// split, with pending faces and nothing open (`cut_area` is 0). Pending faces that are no longer
+/// faces between two tetrahedra are ignored; after another change of the mesh, give none.
 ///
 /// # Errors
 /// As [`cut`].

@@ -56,8 +56,8 @@ impl<'a> Draft<'a> {
         self.tetrahedra[tetrahedron as usize].map(|node| self.positions[node as usize])
     }
 
-    /// The origin of the point of the edge `nodes` of a part of the old tetrahedron `parent`, at the parameter
-    /// `t` from the first.
+    /// The origin of the point of the edge `nodes` of a part of the old tetrahedron `parent`, at
+    /// the parameter `t` from the first.
     pub(crate) fn between(&self, nodes: [u32; 2], t: f64, parent: u32) -> NodeOrigin {
         let [a, b] = nodes.map(|node| &self.origins[node as usize]);
         if let (Some(a), Some(b)) = (a.kept_node(), b.kept_node()) {

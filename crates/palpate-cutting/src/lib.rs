@@ -1,9 +1,9 @@
 //! Cuts a tetrahedral mesh along a blade: geometry and topology only, no mechanics.
 //!
-//! The way of a cut: a [`Blade`] is one or more oriented sheets; each sheet finds the tetrahedra it passes
-//! through and the side of their nodes (`crossing`); nodes too close to it are taken to lie on it
-//! (`snap`); the edges that are left crossed are split (`split`); the faces between the two sides are
-//! opened by copying nodes (`separate`).
+//! The way of a cut: a [`Blade`] is one or more oriented sheets; each sheet finds the tetrahedra it
+//! passes through and the side of their nodes (`crossing`); nodes too close to it are taken to lie
+//! on it (`snap`); the edges that are left crossed are split (`split`); the faces between the two
+//! sides are opened by copying nodes (`separate`).
 
 mod blade;
 mod crossing;

@@ -15,14 +15,14 @@ pub struct CutReport {
     pub pieces_before: usize,
     /// Pieces without a common node, after.
     pub pieces: usize,
-    /// Smallest radius ratio (`3 r_in / r_out`, 1 is regular) of the parts of split tetrahedra, at rest; none when none
-    /// was split.
+    /// Smallest radius ratio (`3 r_in / r_out`, 1 is regular) of the parts of split tetrahedra, at
+    /// rest; none when none was split.
     pub smallest_quality: Option<f64>,
     /// Volume at rest after, relative to before, minus 1: rounding only, as no old node is moved.
     pub volume_change: f64,
     /// Area [m²] of one lip of the cut, at present positions.
     pub cut_area: f64,
-    /// Largest distance [m] of the cut from the blade's surface (continued beyond its border) at old nodes
-    /// through which it passes, at present positions.
+    /// Largest distance [m] of the cut from the blade's surface (continued beyond its border) at
+    /// old nodes through which it passes, at present positions.
     pub deviation: f64,
 }

@@ -12,7 +12,8 @@ use crate::groups::Groups;
 pub(crate) struct Opened {
     /// Area [m²] of one lip, at present positions.
     pub(crate) area: f64,
-    /// Largest distance [m] of a node of the lips from the blade's surface, continued beyond its border.
+    /// Largest distance [m] of a node of the lips from the blade's surface, continued beyond its
+    /// border.
     pub(crate) deviation: f64,
 }
 
@@ -35,12 +36,12 @@ enum Outcome {
     Joined([u32; 3]),
 }
 
-/// The mesh with every face opened that lies on the sheet, has tetrahedra of both sides, and of which at least one is touched
-/// or the sheet covers the face; `None` when nothing comes apart.
+/// The mesh with every face opened that lies on the sheet, has tetrahedra of both sides, and of
+/// which at least one is touched or the sheet covers the face; `None` when nothing comes apart.
 ///
-/// Around each node of such faces, tetrahedra that are still joined by other faces keep one copy of the node: at the end of a
-/// partial cut all of them are, and it stays closed. Pieces of less volume at rest than `min_volume` [m³] are left where
-/// they were.
+/// Around each node of such faces, tetrahedra that are still joined by other faces keep one copy of
+/// the node: at the end of a partial cut all of them are, and it stays closed. Pieces of less
+/// volume at rest than `min_volume` [m³] are left where they were.
 pub(crate) fn open<'a>(
     draft: &Draft<'a>,
     is_touched: &[bool],

@@ -1,9 +1,9 @@
 //! Which nodes are taken to lie on the sheet, so that no part of a split tetrahedron is a sliver.
 //!
-//! A node that is taken to lie on the sheet stays where it is: the cut passes through it, off the blade by its
-//! distance. In exchange nothing moves: material volume, each tetrahedron's strain and the shape of what is not
-//! cut are kept, and because taking more nodes always ends in no split at all, the bound on shape holds
-//! whatever the blade does.
+//! A node that is taken to lie on the sheet stays where it is: the cut passes through it, off the
+//! blade by its distance. In exchange nothing moves: material volume, each tetrahedron's strain and
+//! the shape of what is not cut are kept, and because taking more nodes always ends in no split at
+//! all, the bound on shape holds whatever the blade does.
 
 use std::collections::VecDeque;
 
@@ -56,8 +56,8 @@ pub(crate) struct Plan {
     pub(crate) snapped: usize,
 }
 
-/// Takes nodes to lie on the sheet until all parts are well shaped; returns the edges that are then left
-/// crossed.
+/// Takes nodes to lie on the sheet until all parts are well shaped; returns the edges that are then
+/// left crossed.
 pub(crate) fn plan(
     draft: &Draft,
     edges: &[CrossedEdge],
@@ -103,8 +103,9 @@ fn split_at(draft: &Draft, edge: CrossedEdge) -> Split {
 
 /// Takes the nodes close to the sheet, the closest first; returns how many.
 ///
-/// Along the lips of an earlier cut the nearer end counts wherever it is: where that cut ended this one goes on from there, else
-/// they would pass each other and leave a bridge; and a blade that goes through a wound again shaves nothing off its lips.
+/// Along the lips of an earlier cut the nearer end counts wherever it is: where that cut ended this
+/// one goes on from there, else they would pass each other and leave a bridge; and a blade that
+/// goes through a wound again shaves nothing off its lips.
 fn snap_close(
     draft: &Draft,
     splits: &mut [Split],
@@ -162,7 +163,8 @@ fn stars(draft: &Draft, splits: &[Split]) -> Vec<Star> {
     stars
 }
 
-/// Takes more nodes wherever a tetrahedron would have too flat a part, until none has; returns how many.
+/// Takes more nodes wherever a tetrahedron would have too flat a part, until none has; returns how
+/// many.
 fn snap_slivers(
     draft: &Draft,
     splits: &[Split],
@@ -198,8 +200,8 @@ fn snap_slivers(
 
 /// The node to take so that a tetrahedron has no sliver among its parts; `None` when it has none.
 ///
-/// The end closest to the sheet (as a part of its edge) whose taking leaves only well-shaped parts; when there is none,
-/// the closest of all.
+/// The end closest to the sheet (as a part of its edge) whose taking leaves only well-shaped parts;
+/// when there is none, the closest of all.
 fn node_to_snap(
     draft: &Draft,
     splits: &[Split],
@@ -238,7 +240,8 @@ struct Shape<'a> {
     points: [Point; 10],
     /// Parts below this quality are slivers: the bound, or the whole's own where that is lower.
     min_quality: f64,
-    /// Parts have no shorter edges: the square of the bound, or the whole's own where that is smaller.
+    /// Parts have no shorter edges: the square of the bound, or the whole's own where that is
+    /// smaller.
     min_edge_squared: f64,
 }
 
@@ -263,7 +266,8 @@ impl<'a> Shape<'a> {
         }
     }
 
-    /// Whether all parts that the edges accepted by `is_live` make are positive, no slivers and not too small.
+    /// Whether all parts that the edges accepted by `is_live` make are positive, no slivers and not
+    /// too small.
     fn is_good(&self, is_live: &impl Fn(&Split) -> bool) -> bool {
         let corner = |node: u32| {
             self.nodes.iter().position(|&other| other == node).expect("an edge of it") as u8

@@ -1,10 +1,10 @@
 //! Splits tetrahedra at points of their edges, so that neighbours agree.
 //!
-//! A tetrahedron is halved at one edge after the other, the edges in an order that is the same for the
-//! whole mesh. On a face that two tetrahedra share, both then do the same, so the parts fit together, and
-//! no order or pattern needs points inside (sequences of bisections always exist). When all edges between
-//! two sides are split, each part lies on one side: a halving replaces one end by a point on the sheet and
-//! makes no new edge between the sides.
+//! A tetrahedron is halved at one edge after the other, the edges in an order that is the same for
+//! the whole mesh. On a face that two tetrahedra share, both then do the same, so the parts fit
+//! together, and no order or pattern needs points inside (sequences of bisections always exist).
+//! When all edges between two sides are split, each part lies on one side: a halving replaces one
+//! end by a point on the sheet and makes no new edge between the sides.
 
 use crate::crossing::Sides;
 use crate::draft::Draft;
@@ -53,7 +53,8 @@ impl Parts {
     }
 }
 
-/// Splits all edges of `plan`; parts are touched where the whole was, and the points of edges lie on the sheet.
+/// Splits all edges of `plan`; parts are touched where the whole was, and the points of edges lie
+/// on the sheet.
 pub(crate) fn apply(draft: &mut Draft, plan: &Plan, is_touched: &mut Vec<bool>, sides: &mut Sides) {
     let first_point = draft.origins.len() as u32;
     for split in &plan.splits {

@@ -1,11 +1,13 @@
 //! Where earlier cuts are.
 //!
-//! At rest the lips of a cut lie on each other: the copies of a node are at the same place, to the bit.
+//! At rest the lips of a cut lie on each other: the copies of a node are at the same place, to the
+//! bit.
 
 use palpate_geometry::{Point, vec3};
 use palpate_model::Mesh;
 
-/// How exactly opposite the normals of two lips are at rest, where they are the same but for rounding.
+/// How exactly opposite the normals of two lips are at rest, where they are the same but for
+/// rounding.
 const CLOSED: f64 = 1.0 - 1e-9;
 
 /// A blade goes along a lip when their normals are less than 45° apart.

@@ -103,8 +103,9 @@ impl Mesh {
         Ok((Self::from_checked(data), report))
     }
 
-    /// The mesh that `data` makes, where all tetrahedra but the changed ones are those of this mesh, with the same numbers, rest
-    /// positions and neighbours: the same as [`Mesh::new`], looking only at what has changed.
+    /// The mesh that `data` makes, where all tetrahedra but the changed ones are those of this mesh,
+    /// with the same numbers, rest positions and neighbours: the same as [`Mesh::new`], looking only
+    /// at what has changed.
     fn after_change(&self, mut data: MeshData, is_changed: &[bool]) -> Result<Self, MeshError> {
         check::check_arrays(&mut data)?;
         check::check_changed(&data, is_changed)?;

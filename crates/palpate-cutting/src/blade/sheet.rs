@@ -5,8 +5,8 @@ use palpate_geometry::{Aabb, Point, point_triangle, predicates::orient3d, vec3};
 /// Most triangles in a leaf of the tree of boxes.
 const LEAF: usize = 1;
 
-/// How far from the smallest squared distance another triangle counts as closest as well: it shares the
-/// closest edge or point, and its distance differs by rounding only.
+/// How far from the smallest squared distance another triangle counts as closest as well: it shares
+/// the closest edge or point, and its distance differs by rounding only.
 const TIE: f64 = 1e-9;
 
 /// Coherently oriented triangles under a binary tree of boxes.
@@ -62,7 +62,8 @@ impl Sheet {
         &self.triangles[triangle as usize]
     }
 
-    /// Calls `visit` with each triangle whose box meets `bounds` (some whose do not may come as well).
+    /// Calls `visit` with each triangle whose box meets `bounds` (some whose do not may come as
+    /// well).
     pub(crate) fn for_each_near(&self, bounds: &Aabb, mut visit: impl FnMut(u32)) {
         let mut at = 0;
         let mut waiting = Waiting::new();
@@ -85,8 +86,8 @@ impl Sheet {
 
     /// The side of `point`, beyond the border of the sheet as well.
     ///
-    /// Where several triangles are equally close (at a common edge or corner), the one counts whose plane is
-    /// furthest away: the others may have the point on their wrong side there.
+    /// Where several triangles are equally close (at a common edge or corner), the one counts whose
+    /// plane is furthest away: the others may have the point on their wrong side there.
     pub(crate) fn side(&self, point: Point) -> Side {
         let mut nearest = f64::INFINITY;
         self.for_each_within(point, f64::INFINITY, |_, distance_squared| {
@@ -111,8 +112,8 @@ impl Sheet {
         Side { sign, height: f64::from(sign) * height.abs(), triangle }
     }
 
-    /// Calls `visit` with each triangle that may be within the square root of `limit` of `point`, and its squared
-    /// distance; it returns the new limit.
+    /// Calls `visit` with each triangle that may be within the square root of `limit` of `point`,
+    /// and its squared distance; it returns the new limit.
     fn for_each_within(
         &self,
         point: Point,

@@ -6,8 +6,8 @@ use palpate_geometry::{Point, vec3};
 
 use super::BladeError;
 
-/// Neighbours whose normals are further apart than this cosine (135°) are folded back: each part is a
-/// sheet of its own, as "which side" means nothing close to such a fold.
+/// Neighbours whose normals are further apart than this cosine (135°) are folded back: each part is
+/// a sheet of its own, as "which side" means nothing close to such a fold.
 const FOLD: f64 = -0.7;
 
 /// Points at the same place made one, with the triangles that use them.

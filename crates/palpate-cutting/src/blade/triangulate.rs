@@ -17,8 +17,8 @@ pub(super) fn flattened(point: Point, axis: usize) -> [f64; 2] {
     [point[(axis + 1) % 3], point[(axis + 2) % 3]]
 }
 
-/// Triangles of the polygon `corners` (indices of `points`), by cutting off ears: what an axis along which the
-/// polygon is seen largest makes of it must be simple.
+/// Triangles of the polygon `corners` (indices of `points`), by cutting off ears: what an axis
+/// along which the polygon is seen largest makes of it must be simple.
 pub(super) fn polygon(
     points: &[Point],
     mut corners: Vec<u32>,

@@ -1,4 +1,5 @@
-//! Cuts of boxes of tetrahedra: along planes, strokes and loops, whole and partial, many after another.
+//! Cuts of boxes of tetrahedra: along planes, strokes and loops, whole and partial, many after
+//! another.
 
 mod errors;
 mod organs;

@@ -181,8 +181,8 @@ impl SlowSides {
         Self { triangles: corners.iter().map(|corners| corners.map(at)).collect(), is_border }
     }
 
-    /// The distance from the closest triangle's plane, of equally close ones the furthest; `None` where the closest
-    /// point is on the border.
+    /// The distance from the closest triangle's plane, of equally close ones the furthest; `None`
+    /// where the closest point is on the border.
     fn height(&self, point: Point) -> Option<f64> {
         let found: Vec<_> =
             self.triangles.iter().map(|triangle| point_triangle(point, triangle)).collect();

@@ -32,7 +32,8 @@ fn random_blade(random: &mut Random, size: f64) -> Option<Blade> {
     }
 }
 
-/// Cuts a box again and again, from the start when it has grown much; returns how many cuts opened something.
+/// Cuts a box again and again, from the start when it has grown much; returns how many cuts opened
+/// something.
 fn cut_often(cuts: usize, cells: usize, seed: u64, options: &CutOptions) -> usize {
     let mut random = Random(seed);
     let whole = box_mesh([cells; 3], 0.1, seed);

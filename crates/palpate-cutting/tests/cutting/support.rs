@@ -6,8 +6,8 @@ use palpate_cutting::{Blade, Cut, CutOptions, cut, cut_on};
 use palpate_geometry::{Point, tetrahedron, vec3};
 use palpate_model::{Mesh, MeshData, NodeOrigin};
 
-/// A box of `cells` unit cells of six tetrahedra, one corner at the origin, inner nodes moved by up to `jitter` of
-/// a cell; every tetrahedron is a region and has a fibre of its own.
+/// A box of `cells` unit cells of six tetrahedra, one corner at the origin, inner nodes moved by up
+/// to `jitter` of a cell; every tetrahedron is a region and has a fibre of its own.
 pub(crate) fn box_mesh(cells: [usize; 3], jitter: f64, seed: u64) -> Mesh {
     let index = |[i, j, k]: [usize; 3]| (i + (cells[0] + 1) * (j + (cells[1] + 1) * k)) as u32;
     let mut random = Random(seed);
@@ -71,9 +71,9 @@ impl Random {
     }
 }
 
-/// Cuts, and checks everything that must hold whatever the blade. The parts of a blade are checked one after the other
-/// as well: the later ones may split a lip that an earlier one left, so that what they leave together has
-/// lips that are no images of each other.
+/// Cuts, and checks everything that must hold whatever the blade. The parts of a blade are checked
+/// one after the other as well: the later ones may split a lip that an earlier one left, so that
+/// what they leave together has lips that are no images of each other.
 pub(crate) fn checked_cut(
     old: &Mesh,
     positions: &[Point],
@@ -201,8 +201,8 @@ fn check_parts(old: &Mesh, cut: &Cut, options: &CutOptions) {
     }
 }
 
-/// The surface is the old one, and lips that are each other's image: a node that hangs on a neighbour's
-/// edge or face would leave surface without an image.
+/// The surface is the old one, and lips that are each other's image: a node that hangs on a
+/// neighbour's edge or face would leave surface without an image.
 fn check_conformity(old: &Mesh, cut: &Cut) {
     let change = &cut.change;
     let new = &change.mesh;

@@ -193,8 +193,8 @@ impl MeshChange {
     }
 }
 
-/// Of each tetrahedron whether it, or one that it shares or shared a face with, is not what it was; `None` where old nodes have
-/// moved or old tetrahedra have other numbers.
+/// Of each tetrahedron whether it, or one that it shares or shared a face with, is not what it was;
+/// `None` where old nodes have moved or old tetrahedra have other numbers.
 fn changed_tetrahedra(old: &Mesh, data: &MeshData, parents: &[u32]) -> Option<Vec<bool>> {
     let old_tetrahedra = old.tetrahedra();
     let keeps_nodes = data.nodes.get(..old.nodes().len()) == Some(old.nodes());
@@ -370,7 +370,8 @@ mod tests {
                 }
             }
             let nodes = vec![NodeOrigin::kept(0); positions.len()];
-            let found = MeshChange::new(&old, positions.clone(), corners.clone(), nodes.clone(), parents.clone());
+            let found =
+                MeshChange::new(&old, positions.clone(), corners.clone(), nodes, parents);
             let data = MeshData { nodes: positions, tetrahedra: corners, ..MeshData::default() };
             let expected = Mesh::new(data);
             match (found, expected) {

@@ -80,7 +80,8 @@ pub(super) fn boundary_faces(
     (triangles, boundary.iter().map(|&face| face / 4).collect())
 }
 
-/// The same after some tetrahedra have changed, from the faces `before` of those that have not, in tetrahedron order.
+/// The same after some tetrahedra have changed, from the faces `before` of those that have not, in
+/// tetrahedron order.
 ///
 /// Tetrahedra that share a face with a changed one must have kept it or have changed as well.
 pub(super) fn boundary_faces_after(
