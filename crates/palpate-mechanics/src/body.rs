@@ -1,5 +1,6 @@
 //! One body: its rest state, its matrices and how it moves when nothing touches it.
 
+mod change;
 mod elastic;
 mod element;
 mod frame;
@@ -10,11 +11,12 @@ pub(crate) mod turning;
 use glam::DVec3;
 use palpate_geometry::Point;
 use palpate_model::{Body, Pose};
+use palpate_solver::OrderingMethod;
 
 use crate::contact::compliance::ComplianceCache;
 use crate::error::MechanicsError;
 use crate::state::BodyState;
-pub(crate) use elastic::ElasticBody;
+pub(crate) use elastic::{ElasticBody, Known};
 pub(crate) use rigid::RigidBody;
 
 /// A body in motion. All arrays have one entry per node.
@@ -67,13 +69,14 @@ impl MovingBody {
         body: &Body,
         gravity: Point,
         time_step: f64,
+        known: Known,
     ) -> Result<Self, MechanicsError> {
         let nodes = body.mesh.nodes();
         let (kind, compliance) = if let Some(motion) = &body.rigid {
             let rigid = RigidBody::new(nodes, motion);
             (BodyKind::Rigid(Box::new(rigid)), ComplianceCache::default())
         } else {
-            let elastic = ElasticBody::new(index, body, gravity, time_step)?;
+            let elastic = ElasticBody::new(index, body, gravity, time_step, known)?;
             let compliance = ComplianceCache::new(&body.mesh, &elastic);
             (BodyKind::Elastic(Box::new(elastic)), compliance)
         };
@@ -236,6 +239,13 @@ impl MovingBody {
     /// The positions whose stiffness is in use; empty for those of the rest shape.
     pub(crate) fn stiff_shape(&self) -> &[Point] {
         self.elastic().map_or(&[], ElasticBody::stiff_shape)
+    }
+
+    /// The order of elimination that the body was given; empty if it found its own.
+    pub(crate) fn order(&self) -> &[u32] {
+        let given =
+            |elastic: &&ElasticBody| elastic.factor_stats().ordering == OrderingMethod::Given;
+        self.elastic().filter(given).map_or(&[], ElasticBody::order)
     }
 
     pub(crate) fn set_pose(&mut self, pose: Option<Pose>) {

@@ -1,5 +1,6 @@
 //! The bodies in motion: two calls per step, with contact detection by the caller between them.
 
+mod change;
 mod hands;
 
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -11,7 +12,7 @@ use palpate_model::Model;
 use palpate_solver::FactorStats;
 use rayon::prelude::*;
 
-use crate::body::{BodyKind, MovingBody, first_not_finite};
+use crate::body::{BodyKind, Known, MovingBody, first_not_finite};
 use crate::contact::filter::{BodyView, Candidate};
 use crate::contact::response::Response;
 use crate::contact::{Contact, ContactParameters, Surface};
@@ -129,6 +130,33 @@ impl Dynamics {
     /// If a body cannot be simulated: no tetrahedra and not rigid, a node in no tetrahedron, a
     /// parameter out of range, a matrix that cannot be factored. The error names the body.
     pub fn new(model: &Model, options: DynamicsOptions) -> Result<Self, MechanicsError> {
+        Self::with_known(model, options, |_| Known::default())
+    }
+
+    /// [`Dynamics::new`] in a state of the same model, also one in which bodies were cut.
+    ///
+    /// # Errors
+    /// As [`Dynamics::new`] and [`Dynamics::set_state`].
+    pub fn with_state(
+        model: &Model,
+        options: DynamicsOptions,
+        state: &State,
+    ) -> Result<Self, MechanicsError> {
+        check_orders(model, state)?;
+        let known = |body: usize| {
+            let saved = &state.bodies[body];
+            Known { order: &saved.order, shape: &saved.stiff_shape }
+        };
+        let mut dynamics = Self::with_known(model, options, known)?;
+        dynamics.set_state(state)?;
+        Ok(dynamics)
+    }
+
+    fn with_known<'a>(
+        model: &Model,
+        options: DynamicsOptions,
+        known: impl Fn(usize) -> Known<'a>,
+    ) -> Result<Self, MechanicsError> {
         let time_step = options.time_step;
         if !(time_step.is_finite() && time_step > 0.0) {
             return Err(MechanicsError::TimeStep(time_step));
@@ -139,7 +167,7 @@ impl Dynamics {
         let mut bodies = Vec::with_capacity(model.bodies.len());
         let mut parameters = Vec::with_capacity(model.bodies.len());
         for (index, body) in model.bodies.iter().enumerate() {
-            bodies.push(MovingBody::new(index, body, model.gravity, time_step)?);
+            bodies.push(MovingBody::new(index, body, model.gravity, time_step, known(index))?);
             parameters.push(ContactParameters::new(index, body)?);
         }
         let task_of = assign_tasks(model, options.threads.max(1));
@@ -163,12 +191,7 @@ impl Dynamics {
         let surfaces: Vec<Surface> =
             model.bodies.iter().map(|body| Surface::new(&body.mesh)).collect();
         let mut ties = Ties::default();
-        for attachment in &model.attachments {
-            let [a, b] = attachment.bodies;
-            let pressure =
-                attachment.stiffness.unwrap_or_else(|| parameters[a].stiffness(&parameters[b]));
-            ties.attach(attachment, |node| pressure * surfaces[a].node_area(node));
-        }
+        attach(&mut ties, model, &parameters, &surfaces);
         Ok(Self {
             options,
             pool,
@@ -503,6 +526,7 @@ impl Dynamics {
                 pose: body.rigid().and_then(|rigid| rigid.pose),
                 shape: body.shape(),
                 stiff_shape: body.stiff_shape().to_vec(),
+                order: body.order().to_vec(),
             }
         });
         State {
@@ -529,6 +553,9 @@ impl Dynamics {
             check_array(body, count, &saved.positions, "the position")?;
             check_array(body, count, &saved.velocities, "the velocity")?;
             check_array(body, count, &saved.forces, "the force")?;
+            if saved.order != self.body(body).order() {
+                return Err(MechanicsError::OtherOrder { body });
+            }
             for shape in [&saved.shape, &saved.stiff_shape] {
                 if !shape.is_empty() {
                     check_array(body, count, shape, "the shape")?;
@@ -611,6 +638,37 @@ impl Dynamics {
     pub fn factor_stats(&self, body: usize) -> Option<FactorStats> {
         self.body(body).elastic().map(crate::body::ElasticBody::factor_stats)
     }
+}
+
+/// Ties what the model attaches.
+fn attach(ties: &mut Ties, model: &Model, parameters: &[ContactParameters], surfaces: &[Surface]) {
+    for attachment in &model.attachments {
+        let [a, b] = attachment.bodies;
+        let pressure =
+            attachment.stiffness.unwrap_or_else(|| parameters[a].stiffness(&parameters[b]));
+        ties.attach(attachment, |node| pressure * surfaces[a].node_area(node));
+    }
+}
+
+/// Whether the orders of a state are orders of the model's free nodes, and its shapes of its nodes.
+fn check_orders(model: &Model, state: &State) -> Result<(), MechanicsError> {
+    let (expected, found) = (model.bodies.len(), state.bodies.len());
+    if expected != found {
+        return Err(MechanicsError::WrongBodyCount { expected, found });
+    }
+    for (index, (body, saved)) in model.bodies.iter().zip(&state.bodies).enumerate() {
+        let count = body.mesh.nodes().len();
+        if !saved.stiff_shape.is_empty() {
+            check_array(index, count, &saved.stiff_shape, "the shape")?;
+        }
+        let mut sorted = saved.order.clone();
+        sorted.sort_unstable();
+        let free = count - body.fixed_nodes.len();
+        if !sorted.is_empty() && !sorted.into_iter().eq(0..free as u32) {
+            return Err(MechanicsError::OtherOrder { body: index });
+        }
+    }
+    Ok(())
 }
 
 fn check_array(

@@ -92,6 +92,14 @@ pub enum MechanicsError {
         /// Bodies of the state.
         found: usize,
     },
+    /// A state of a body that was cut, for one that was not cut in the same way.
+    #[error(
+        "the state of body {body} is one after other cuts; go on from it with Dynamics::with_state"
+    )]
+    OtherOrder {
+        /// Index of the body.
+        body: usize,
+    },
     /// NaN or infinity in what was given, or as the result of a step.
     #[error("{what} of node {node} of body {body} is not finite")]
     NotFinite {

@@ -62,4 +62,7 @@ pub struct BodyState {
     /// Positions [m] whose stiffness a body with a nonlinear law is solved with; empty: the rest
     /// shape's.
     pub stiff_shape: Vec<Point>,
+    /// Order in which the free nodes of a body that was cut are eliminated; empty: what the body finds
+    /// itself.
+    pub order: Vec<u32>,
 }

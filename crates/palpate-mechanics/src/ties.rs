@@ -54,6 +54,11 @@ impl Ties {
         }));
     }
 
+    /// Unties what is attached.
+    pub(crate) fn detach(&mut self) {
+        self.attached.clear();
+    }
+
     pub(crate) fn pulls(&self) -> &[Pull] {
         &self.pulls
     }
@@ -88,6 +93,26 @@ impl Ties {
         let count = self.pulls.len();
         self.pulls.retain(|pull| pull.id != id);
         self.pulls.len() < count
+    }
+
+    /// Gives the springs of a body other nodes; those whose node has gone are released and returned.
+    pub(crate) fn change_body(
+        &mut self,
+        body: u32,
+        node_after: impl Fn(u32) -> Option<u32>,
+    ) -> Vec<u64> {
+        let mut released = Vec::new();
+        self.pulls.retain_mut(|pull| {
+            if pull.body != body {
+                return true;
+            }
+            match node_after(pull.node) {
+                Some(node) => pull.node = node,
+                None => released.push(pull.id),
+            }
+            released.last() != Some(&pull.id)
+        });
+        released
     }
 
     /// Goes back to other springs; new ones will not have an identity that was used before.
@@ -166,6 +191,7 @@ fn tie(offset: DVec3, distance: f64) -> Candidate {
         weights: [0.0; 4],
         normal: offset.try_normalize().unwrap_or(DVec3::X),
         gap: 0.0,
+        offset: 0.0,
         distance,
         stiffness: 0.0,
         recovery: 0.0,

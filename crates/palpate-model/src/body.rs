@@ -1,6 +1,7 @@
 //! The model: bodies placed in space, how the text joins them, and what acts on all of them.
 
 mod attachment;
+mod change;
 mod material;
 mod pose;
 mod validate;

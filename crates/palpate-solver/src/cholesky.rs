@@ -159,8 +159,24 @@ impl Cholesky {
     /// # Errors
     /// As [`Cholesky::new`].
     pub fn with_precision(matrix: &BlockMatrix, precision: Precision) -> Result<Self, FactorError> {
+        Self::in_order(matrix, precision, NodeOrder::new(matrix.pattern()))
+    }
+
+    /// [`Cholesky::with_precision`] in an order that is known: finding one can take as long as all the
+    /// rest.
+    ///
+    /// # Errors
+    /// As [`Cholesky::new`].
+    ///
+    /// # Panics
+    /// If the order is one of another pattern.
+    pub fn in_order(
+        matrix: &BlockMatrix,
+        precision: Precision,
+        order: NodeOrder,
+    ) -> Result<Self, FactorError> {
         let pattern = std::sync::Arc::clone(matrix.pattern());
-        let order = NodeOrder::new(&pattern);
+        assert_eq!(order.nodes.len(), pattern.node_count(), "an order of this pattern");
         let scalar = ScalarMatrix::new(&pattern, &order.nodes);
         // With the identity order faer reads the upper pattern here, whatever the side says, and
         // wants the lower triangle in the numeric phase.
@@ -275,6 +291,11 @@ impl Cholesky {
         let left = norm(&residual) / norm(&rhs);
         self.solve_in_place(&mut residual, &mut workspace);
         Probe { residual: left, error: norm(&residual) / norm(&solution) }
+    }
+
+    /// The order of elimination.
+    pub fn order(&self) -> &NodeOrder {
+        &self.order
     }
 
     /// Number of nodes.

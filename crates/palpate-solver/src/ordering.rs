@@ -14,6 +14,8 @@ pub enum OrderingMethod {
     MinimumDegree,
     /// Nested dissection (METIS), best on solid bodies.
     NestedDissection,
+    /// The caller's own.
+    Given,
 }
 
 /// An order of elimination for the nodes of a matrix.
@@ -90,6 +92,21 @@ impl NodeOrder {
             }
         }
         best
+    }
+
+    /// An order of the caller's as a postorder of its elimination tree; of an order that is one already,
+    /// the same.
+    ///
+    /// # Panics
+    /// If `order` does not name every node of the pattern once.
+    pub fn given(pattern: &BlockPattern, order: &[u32]) -> Self {
+        let mut seen = vec![false; pattern.node_count()];
+        let new = |&node: &u32| !std::mem::replace(&mut seen[node as usize], true);
+        assert!(
+            order.len() == pattern.node_count() && order.iter().all(new),
+            "the order must name every node once"
+        );
+        Self::finish(&Graph::new(pattern), OrderingMethod::Given, order)
     }
 
     fn finish(graph: &Graph, method: OrderingMethod, order: &[u32]) -> Self {

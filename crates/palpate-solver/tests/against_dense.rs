@@ -4,8 +4,8 @@
 use std::sync::Arc;
 
 use palpate_solver::{
-    BlockMatrix, BlockPattern, Cholesky, DenseCholesky, FactorError, HalfSolution, Precision,
-    half_products,
+    BlockMatrix, BlockPattern, Cholesky, DenseCholesky, FactorError, HalfSolution, NodeOrder,
+    Precision, half_products,
 };
 use proptest::prelude::*;
 
@@ -298,4 +298,18 @@ fn half_solutions_do_not_depend_on_what_is_solved_with_them() {
             }
         }
     }
+}
+
+#[test]
+fn a_given_order_is_taken_and_keeps_its_bits() {
+    let (count, cells) = grid(6);
+    let pattern = Arc::new(BlockPattern::from_cliques(count, &cells));
+    let found = NodeOrder::new(&pattern);
+    let again = NodeOrder::given(&pattern, &found.nodes);
+    assert_eq!(again.nodes, found.nodes, "a postorder is its own");
+    assert_eq!(again.factor_entries, found.factor_entries);
+    let plain: Vec<u32> = (0..count as u32).collect();
+    let once = NodeOrder::given(&pattern, &plain);
+    assert_eq!(NodeOrder::given(&pattern, &once.nodes).nodes, once.nodes);
+    assert!(once.factor_entries > found.factor_entries);
 }

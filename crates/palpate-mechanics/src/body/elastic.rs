@@ -20,7 +20,7 @@ mod system;
 use glam::{DMat3, DVec3};
 use palpate_geometry::Point;
 use palpate_model::{Body, Law};
-use palpate_solver::{BlockMatrix, Cholesky, FactorStats, HalfSolution, Precision};
+use palpate_solver::{BlockMatrix, Cholesky, FactorStats, HalfSolution, NodeOrder, Precision};
 
 use super::frame::best_rotation;
 use super::inertia::Inertia;
@@ -61,12 +61,22 @@ enum Elasticity {
     Nonlinear(Box<QuasiNewton>),
 }
 
+/// What is known of a body's matrix before it is made; nothing by default.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Known<'a> {
+    /// Order of elimination of the free nodes.
+    pub(crate) order: &'a [u32],
+    /// Positions [m] whose stiffness A is to be made of; empty: those at rest.
+    pub(crate) shape: &'a [Point],
+}
+
 impl ElasticBody {
     pub(super) fn new(
         index: usize,
         body: &Body,
         gravity: Point,
         time_step: f64,
+        known: Known,
     ) -> Result<Self, MechanicsError> {
         check_material(index, body)?;
         let mesh = &body.mesh;
@@ -94,20 +104,39 @@ impl ElasticBody {
         let start = Inertia::new(&masses, nodes, &vec![[0.0; 3]; count]);
         let rest: Vec<DVec3> =
             nodes.iter().map(|&node| DVec3::from_array(node) - start.center).collect();
-        let (elasticity, system) = if material.law == Law::Linear {
+        let factored = |system: &BlockMatrix| {
+            let order = match known.order {
+                [] => NodeOrder::new(system.pattern()),
+                order => NodeOrder::given(system.pattern(), order),
+            };
+            Cholesky::in_order(system, Precision::Single, order).map_err(|source| {
+                let source = in_body_numbering(source, &free_nodes);
+                MechanicsError::Factor { body: index, name: name(), source }
+            })
+        };
+        let (elasticity, factor) = if material.law == Law::Linear {
             let stiffness = linear_stiffness(body);
             let mut system = SystemMatrix::new(&stiffness, &free_index);
             system.fill(&stiffness, &masses, inertia, 1.0 + material.damping / time_step);
-            (Elasticity::Linear(stiffness), system.into_matrix())
+            (Elasticity::Linear(stiffness), factored(&system.into_matrix())?)
         } else {
             let mut method = QuasiNewton::new(body, &free_index);
-            let system = method.system_at_rest(&rest, &masses, inertia, time_step).clone();
-            (Elasticity::Nonlinear(Box::new(method)), system)
+            let mut at_shape = None;
+            if !known.shape.is_empty() {
+                let shape = known.shape.iter().map(|&x| DVec3::from_array(x));
+                let place = place_of(&masses, &rest, shape);
+                let system = method.system_at(known.shape, place, &masses, inertia, time_step);
+                at_shape = factored(system).ok();
+            }
+            let factor = match at_shape {
+                Some(factor) => {
+                    method.set_stiff_shape(known.shape);
+                    factor
+                }
+                None => factored(method.system_at_rest(&rest, &masses, inertia, time_step))?,
+            };
+            (Elasticity::Nonlinear(Box::new(method)), factor)
         };
-        let factor = Cholesky::with_precision(&system, Precision::Single).map_err(|source| {
-            let source = in_body_numbering(source, &free_nodes);
-            MechanicsError::Factor { body: index, name: name(), source }
-        })?;
         let workspace = factor.workspace();
         let step = Step::new(start, count, free_nodes.len(), workspace);
         Ok(Self {
@@ -149,6 +178,11 @@ impl ElasticBody {
     /// The frame of the step that has begun.
     pub(crate) fn frame(&self) -> DMat3 {
         self.step.frame
+    }
+
+    /// Order in which the free nodes are eliminated.
+    pub(crate) fn order(&self) -> &[u32] {
+        &self.factor.order().nodes
     }
 
     pub(crate) fn factor_stats(&self) -> FactorStats {
@@ -263,14 +297,7 @@ impl ElasticBody {
 
     /// Centre of mass and frame of positions.
     fn place_of(&self, positions: impl Iterator<Item = DVec3> + Clone) -> (DVec3, DMat3) {
-        let weighted = self.masses.iter().zip(positions.clone()).map(|(&m, x)| m * x);
-        let center = weighted.sum::<DVec3>() / self.mass;
-        let mut fit = DMat3::ZERO;
-        for ((&m, x), rest) in self.masses.iter().zip(positions).zip(&self.rest) {
-            let r = m * (x - center);
-            fit += DMat3::from_cols(rest.x * r, rest.y * r, rest.z * r);
-        }
-        (center, best_rotation(fit))
+        place_of(&self.masses, &self.rest, positions)
     }
 
     /// Arms of positions `x` about their centre, in their frame [m].
@@ -295,6 +322,22 @@ impl ElasticBody {
         let pairs = strain.as_flattened().iter().zip(product.as_flattened());
         0.5 * pairs.map(|(u, f)| u * f).sum::<f64>()
     }
+}
+
+/// Centre of mass and frame of positions, `rest` being relative to the centre at rest.
+fn place_of(
+    masses: &[f64],
+    rest: &[DVec3],
+    positions: impl Iterator<Item = DVec3> + Clone,
+) -> (DVec3, DMat3) {
+    let weighted = masses.iter().zip(positions.clone()).map(|(&m, x)| m * x);
+    let center = weighted.sum::<DVec3>() / masses.iter().sum::<f64>();
+    let mut fit = DMat3::ZERO;
+    for ((&m, x), rest) in masses.iter().zip(positions).zip(rest) {
+        let r = m * (x - center);
+        fit += DMat3::from_cols(rest.x * r, rest.y * r, rest.z * r);
+    }
+    (center, best_rotation(fit))
 }
 
 /// 1/dt² + alpha/dt: force [N] per mass and displacement.

@@ -26,6 +26,11 @@ const REST_NEIGHBOUR: f64 = 2.0;
 /// A node behind its own body's surface has passed through it when the two were this many times
 /// farther apart at rest; otherwise there is only a thin wall between them.
 const PASSED_THROUGH: f64 = 4.0;
+/// Lips of a cut: the normals of a node and a triangle at rest have at most this cosine, and the node is
+/// behind the triangle by no more than this part of the mean edge. The nodes at the rim of a lip also have
+/// a part of the skin around them.
+const LIP_COSINE: f64 = -0.3;
+const COINCIDENT: f64 = 1e-6;
 /// Time in which the contact distance is recovered where surfaces overlap [s].
 const RECOVERY_TIME: f64 = 0.05;
 
@@ -41,8 +46,10 @@ pub(crate) struct Candidate {
     pub(crate) nodes: [u32; 4],
     pub(crate) weights: [f64; 4],
     pub(crate) normal: DVec3,
-    /// Gap at the start of the step [m], negative inside.
+    /// Gap at the start of the step [m], negative inside; `offset` more between the lips of a cut.
     pub(crate) gap: f64,
+    /// By how much the surfaces may come closer than the contact distance before they push [m].
+    pub(crate) offset: f64,
     /// Gap below which the surfaces push [m].
     pub(crate) distance: f64,
     /// Force per overlap [N/m].
@@ -53,6 +60,15 @@ pub(crate) struct Candidate {
     /// For a tie: from where side a should be to where it is at the start of the step [m]. A tie works
     /// against that in every direction with its stiffness; gap, recovery and friction do not count.
     pub(crate) tied: Option<DVec3>,
+}
+
+/// Which gap a contact has, along which normal.
+#[derive(Clone, Copy, Debug)]
+struct Meeting {
+    gap: f64,
+    normal: DVec3,
+    /// See [`Candidate::offset`].
+    offset: f64,
 }
 
 /// What the filter sees of one body.
@@ -117,7 +133,7 @@ impl Filter {
                 PairKind::VertexTriangle => self.vertex_triangle(pair, bodies, is_loaded(pair)),
                 PairKind::EdgeEdge => edge_edge(pair, bodies, is_loaded(pair)),
             };
-            if let Some((gap, normal)) = gap {
+            if let Some(Meeting { gap, normal, offset }) = gap {
                 let area = match pair.kind {
                     PairKind::VertexTriangle => bodies[0].surface.node_area(pair.nodes[0]),
                     PairKind::EdgeEdge => {
@@ -125,7 +141,8 @@ impl Filter {
                             + bodies[1].surface.edge_area(pair.elements[1]))
                     }
                 };
-                candidates.push(candidate(pair, gap, normal, area, bodies, time_step));
+                let candidate = candidate(pair, gap + offset, normal, area, bodies, time_step);
+                candidates.push(Candidate { offset, ..candidate });
             }
         }
         self.drop_twins(candidates);
@@ -199,7 +216,7 @@ impl Filter {
         pair: &ProximityPair,
         [own, other]: [BodyView<'_>; 2],
         is_loaded: bool,
-    ) -> Option<(f64, DVec3)> {
+    ) -> Option<Meeting> {
         let slack = if is_loaded { LOADED_SLACK } else { ANGLE_SLACK };
         let key = (pair.bodies[0], pair.nodes[0], pair.bodies[1]);
         if self.inside.binary_search(&key).is_ok() {
@@ -238,13 +255,18 @@ impl Filter {
         };
         let own_surface = pair.bodies[0] == pair.bodies[1];
         let mut behind = other.surface.is_closed() && outward.dot(normal) < 0.0;
+        let mut offset = 0.0;
         if own_surface {
             let h = own.parameters.distance(own.parameters);
             let apart = rest_distance(pair, [own, other]);
-            if apart < REST_NEIGHBOUR * h {
+            let lips = apart < PASSED_THROUGH * h && are_lips(pair, &own);
+            if apart < REST_NEIGHBOUR * h && !lips {
                 return None;
             }
-            if behind && apart > PASSED_THROUGH * gap.max(h) {
+            if lips {
+                offset = h - apart.min(h);
+            }
+            if behind && (lips || apart > PASSED_THROUGH * gap.max(h)) {
                 // Through its own surface: pushed back the way it came.
                 (gap, normal, behind) = (-gap, -normal, false);
             }
@@ -255,7 +277,7 @@ impl Filter {
         let faces_away = own.surface.is_closed()
             && own.surface.node_normal(node, own.positions).dot(normal) > FACING_LIMIT;
         if !faces_away {
-            return Some((gap, normal));
+            return Some(Meeting { gap, normal, offset });
         }
         // The node of a closed body has slipped through an open surface when an edge from it
         // crosses back: it is pulled out again. Otherwise it only sees that surface through its body.
@@ -265,8 +287,19 @@ impl Filter {
                 .node_neighbours(node)
                 .iter()
                 .any(|&neighbour| (own.at(neighbour) - own.at(node)).dot(normal) < -gap);
-        through.then_some((-gap, -normal))
+        through.then_some(Meeting { gap: -gap, normal: -normal, offset: 0.0 })
     }
+}
+
+/// Whether a node and a triangle of one body face each other at rest, as the two lips of a cut do, where
+/// they are closer than any contact distance. On the two sides of a thin wall each is behind the other.
+fn are_lips(pair: &ProximityPair, body: &BodyView<'_>) -> bool {
+    let mesh = body.surface.mesh();
+    let triangle = body.surface.triangle_normal(pair.elements[1], mesh.nodes());
+    let corner = mesh.triangles()[pair.elements[1] as usize][0];
+    let height = (body.rest(pair.nodes[0]) - body.rest(corner)).dot(triangle);
+    height > -COINCIDENT * body.parameters.mean_edge
+        && body.surface.node_normal(pair.nodes[0], mesh.nodes()).dot(triangle) < LIP_COSINE
 }
 
 /// Gap and normal of an edge against an edge, if the pair is a contact.
@@ -274,7 +307,7 @@ fn edge_edge(
     pair: &ProximityPair,
     [own, other]: [BodyView<'_>; 2],
     is_loaded: bool,
-) -> Option<(f64, DVec3)> {
+) -> Option<Meeting> {
     let (slack, sharp_edge) =
         if is_loaded { (LOADED_SLACK, LOADED_SHARP_EDGE) } else { (ANGLE_SLACK, SHARP_EDGE) };
     if pair.weights.contains(&0.0) {
@@ -302,7 +335,7 @@ fn edge_edge(
     let neighbours = pair.bodies[0] == pair.bodies[1]
         && rest_distance(pair, [own, other])
             < REST_NEIGHBOUR * own.parameters.distance(own.parameters);
-    (kept && !neighbours).then_some((pair.distance, normal))
+    (kept && !neighbours).then_some(Meeting { gap: pair.distance, normal, offset: 0.0 })
 }
 
 /// True when going along `step` does not come closer to a point in direction `normal`.
@@ -338,6 +371,7 @@ fn candidate(
         weights: pair.weights,
         normal,
         gap,
+        offset: 0.0,
         distance,
         stiffness: share * area * a.stiffness(b),
         recovery: gap + distance * time_step / RECOVERY_TIME,

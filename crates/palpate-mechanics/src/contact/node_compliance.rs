@@ -195,7 +195,7 @@ mod tests {
     use palpate_model::{Body, Mesh, MeshData};
 
     use super::*;
-    use crate::body::{BodyKind, MovingBody};
+    use crate::body::{BodyKind, Known, MovingBody};
 
     /// Tetrahedra around a common edge.
     fn wheel(count: u32) -> MovingBody {
@@ -206,7 +206,7 @@ mod tests {
             data.tetrahedra.push([0, 2 + rim, 2 + (rim + 1) % count, 1]);
         }
         let body = Body::new("wheel", Arc::new(Mesh::new(data).unwrap()));
-        MovingBody::new(0, &body, [0.0; 3], 0.01).unwrap()
+        MovingBody::new(0, &body, [0.0; 3], 0.01, Known::default()).unwrap()
     }
 
     /// Gathers nodes that change from step to step and compares all entries with the columns of A⁻¹.

@@ -105,6 +105,13 @@ impl Problem {
         }
     }
 
+    /// Forgets a body's nodes and compliance.
+    pub(crate) fn forget_body(&mut self, body: usize) {
+        if let Some(part) = self.bodies.get_mut(body) {
+            *part = BodyPart::default();
+        }
+    }
+
     /// Nodes of a body that contacts of this step or the last one can move, ascending.
     pub(crate) fn nodes(&self, body: usize) -> &[u32] {
         &self.bodies[body].nodes

@@ -69,7 +69,9 @@ impl Response {
                 return true;
             }
             let moved = candidate.normal.dot(expected_displacement(candidate, &body));
-            let close = candidate.gap.min(candidate.gap + moved) < CLOSE * candidate.distance;
+            // Between lips that fit without pushing only those that are about to overlap: they are many.
+            let reach = if candidate.offset > 0.0 { 1.0 } else { CLOSE };
+            let close = candidate.gap.min(candidate.gap + moved) < reach * candidate.distance;
             if !close {
                 spare.push(*candidate);
             }
@@ -183,7 +185,9 @@ impl Response {
                 weights: candidate.weights,
                 normal: candidate.normal.to_array(),
                 point: point.to_array(),
-                gap: candidate.gap + block.free.x + self.solver.moved(&self.problem, block).x,
+                gap: candidate.gap - candidate.offset
+                    + block.free.x
+                    + self.solver.moved(&self.problem, block).x,
                 normal_force: force.x,
                 friction_force: friction.to_array(),
             };
@@ -201,6 +205,17 @@ impl Response {
     /// Forces of the last step.
     pub(crate) fn last(&self) -> &LastForces {
         &self.last
+    }
+
+    /// Other nodes that are attached, as in [`Response::new`].
+    pub(crate) fn set_attached(&mut self, attached: Vec<(u32, u32, u32)>) {
+        self.filter = Filter::new(attached);
+    }
+
+    /// Forgets what it remembers of a body's response: the body has changed.
+    pub(crate) fn forget_body(&mut self, body: usize) {
+        self.problem.forget_body(body);
+        self.spare.clear();
     }
 
     /// Goes back to the forces of another step; no contacts are reported until the next one ends.

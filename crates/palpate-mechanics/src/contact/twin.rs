@@ -109,6 +109,7 @@ fn random_problem(kind: Kind) -> Known {
             weights: [1.0, -0.5, -0.25, -0.25],
             normal: DVec3::Z,
             gap,
+            offset: 0.0,
             distance,
             stiffness: 1e3 * kind.stiffness * random.between(0.5, 2.0),
             recovery: gap + distance / 3.0,

@@ -1,6 +1,7 @@
 //! Physics that the mechanics must get right, body by body and in contact.
 
 mod attachment;
+mod change;
 mod contact;
 mod determinism;
 mod elasticity;

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use palpate_contact::{IntersectionOptions, PenetratingNode, ProximityPair, Scene, SceneOptions};
 use palpate_geometry::Point;
-use palpate_mechanics::{Dynamics, DynamicsOptions, StepStats};
-use palpate_model::{Body, Material, Mesh, MeshData, Model, RigidMotion};
+use palpate_mechanics::{Dynamics, DynamicsOptions, State, StepStats};
+use palpate_model::{Body, Material, Mesh, MeshChange, MeshData, Model, RigidMotion};
 
 pub(crate) const GRAVITY: f64 = 9.81;
 
@@ -71,6 +71,23 @@ pub(crate) struct World {
 impl World {
     pub(crate) fn new(model: &Model, time_step: f64, threads: usize) -> Self {
         let dynamics = Dynamics::new(model, DynamicsOptions { time_step, threads }).unwrap();
+        let meshes = model.bodies.iter().map(|body| Arc::clone(&body.mesh)).collect();
+        let scene = Scene::new(meshes, Some(&model.structure), SceneOptions::default()).unwrap();
+        Self { dynamics, scene }
+    }
+
+    /// Goes on with a body whose mesh was changed; returns the model after it.
+    pub(crate) fn change(&mut self, model: &Model, index: usize, change: &MeshChange) -> Model {
+        let after = model.changed(index, change);
+        self.dynamics.change_body(&after, index, change).unwrap();
+        self.scene.change_body(index, change).unwrap();
+        after
+    }
+
+    /// A world of the model after cuts, in a state of another one.
+    pub(crate) fn in_state(model: &Model, time_step: f64, state: &State) -> Self {
+        let options = DynamicsOptions { time_step, threads: 1 };
+        let dynamics = Dynamics::with_state(model, options, state).unwrap();
         let meshes = model.bodies.iter().map(|body| Arc::clone(&body.mesh)).collect();
         let scene = Scene::new(meshes, Some(&model.structure), SceneOptions::default()).unwrap();
         Self { dynamics, scene }

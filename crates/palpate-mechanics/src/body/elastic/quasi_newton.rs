@@ -102,6 +102,27 @@ impl QuasiNewton {
         self.system_of_arms(masses, inertia, time_step)
     }
 
+    /// A at `shape` [m], whose centre and frame are `place`.
+    pub(super) fn system_at(
+        &mut self,
+        shape: &[Point],
+        (center, frame): (DVec3, DMat3),
+        masses: &[f64],
+        inertia: f64,
+        time_step: f64,
+    ) -> &BlockMatrix {
+        self.stiff_arms.clear();
+        let to_frame = frame.transpose();
+        self.stiff_arms.extend(shape.iter().map(|&x| to_frame * (DVec3::from_array(x) - center)));
+        self.system_of_arms(masses, inertia, time_step)
+    }
+
+    /// Says that A is made of the stiffness at `shape`.
+    pub(super) fn set_stiff_shape(&mut self, shape: &[Point]) {
+        self.stiff_shape.clear();
+        self.stiff_shape.extend_from_slice(shape);
+    }
+
     /// A of the shape that the arms give, in its frame.
     fn system_of_arms(&mut self, masses: &[f64], inertia: f64, time_step: f64) -> &BlockMatrix {
         for (x, arm) in self.x.iter_mut().zip(&self.stiff_arms) {
@@ -164,11 +185,10 @@ impl ElasticBody {
         method.stiff_shape.clear();
         let (inertia, time_step) = (self.inertia(), self.time_step);
         if !shape.is_empty() {
-            method.stiff_arms.clear();
-            method.stiff_arms.extend(self.arms_of(shape));
-            let system = method.system_of_arms(&self.masses, inertia, time_step);
+            let place = self.place_of(shape.iter().map(|&x| DVec3::from_array(x)));
+            let system = method.system_at(shape, place, &self.masses, inertia, time_step);
             if self.factor.refactor(system).is_ok() {
-                method.stiff_shape.extend_from_slice(shape);
+                method.set_stiff_shape(shape);
                 return true;
             }
         }
