@@ -1,5 +1,6 @@
 //! Object data on disk: `.seg` and legacy `.vtk`, by extension.
 
+mod model;
 mod seg;
 mod tokens;
 mod vtk;
@@ -12,6 +13,7 @@ use std::path::{Path, PathBuf};
 use crate::mesh::{Mesh, MeshData, MeshError, Place};
 use tokens::ReadError;
 
+pub use model::write_model;
 pub use vtk::{VtkEncoding, write_vtk};
 
 /// How a mesh file is read.

@@ -10,7 +10,9 @@ pub use body::{
     Appearance, AttachedNode, Attachment, AttachmentError, Body, BodyError, ContactSettings, Law,
     Material, Model, Pose, PoseParts, RigidKey, RigidMotion, Structure, triangle_axes,
 };
-pub use files::{FileError, FileErrorCause, ReadMesh, ReadOptions, read_mesh, write_mesh};
+pub use files::{
+    FileError, FileErrorCause, ReadMesh, ReadOptions, read_mesh, write_mesh, write_model,
+};
 pub use language::{
     CoreLoader, Diagnostic, Document, LoadError, MeshLoader, ModelError, load_model,
 };

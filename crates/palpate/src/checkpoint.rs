@@ -12,10 +12,10 @@ use palpate_model::files::write_whole;
 use palpate_model::{Document, Model};
 use serde::{Deserialize, Serialize};
 
-use crate::simulation::{Simulation, SimulationError, SimulationOptions};
+use crate::simulation::{Simulation, SimulationError, SimulationOptions, Snapshot};
 
 const MAGIC: [u8; 8] = *b"palpate\n";
-const VERSION: u32 = 3;
+const VERSION: u32 = 4;
 const HEADER: usize = 8 + 4 + 8 + 4;
 
 /// Why a checkpoint could not be written or read.
@@ -48,13 +48,15 @@ pub enum CheckpointError {
     },
 }
 
-/// What a checkpoint holds. The document travels as text, its one exact form.
+/// What a checkpoint holds. Documents travel as text, their one exact form.
 #[derive(Deserialize, Serialize)]
 struct Payload<M, S> {
     model: M,
     text: Option<String>,
     time_step: f64,
     scene: SceneOptions,
+    /// Before all cuts; `None` where there were none.
+    initial_model: Option<(M, Option<String>)>,
     initial: S,
     state: S,
 }
@@ -65,13 +67,16 @@ impl Simulation {
     /// # Errors
     /// If the file cannot be written.
     pub fn save(&self, path: &Path) -> Result<(), CheckpointError> {
+        let (initial, now) = (self.initial(), self.snapshot());
+        let was_cut = !Arc::ptr_eq(&initial.model, &now.model);
         let payload = Payload {
             model: self.model().as_ref(),
             text: self.model().to_text(),
             time_step: self.options().time_step,
             scene: self.options().scene,
-            initial: self.initial(),
-            state: &self.snapshot(),
+            initial_model: was_cut.then(|| (initial.model.as_ref(), initial.model.to_text())),
+            initial: &initial.state,
+            state: &now.state,
         };
         let io = |source| CheckpointError::Io { path: path.to_path_buf(), source };
         let bytes = postcard::to_stdvec(&payload)
@@ -91,17 +96,23 @@ impl Simulation {
         let payload = checked_payload(&bytes).map_err(unreadable)?;
         let payload: Payload<Model, State> = postcard::from_bytes(payload)
             .map_err(|error| unreadable(format!("the checkpoint is damaged: {error}")))?;
-        let mut model = payload.model;
-        if let Some(text) = &payload.text {
-            let document = Document::parse(text, path);
-            model.document = Some(document.map_err(|error| unreadable(error.to_string()))?);
-        }
+        let with_text = |mut model: Model, text: Option<String>| {
+            if let Some(text) = &text {
+                let document = Document::parse(text, path);
+                model.document = Some(document.map_err(|error| unreadable(error.to_string()))?);
+            }
+            Ok::<_, CheckpointError>(Arc::new(model))
+        };
+        let model = with_text(payload.model, payload.text)?;
+        let initial_model = match payload.initial_model {
+            Some((initial, text)) => with_text(initial, text)?,
+            None => Arc::clone(&model),
+        };
         let options =
             SimulationOptions { time_step: payload.time_step, scene: payload.scene, threads };
         let continued = || {
-            let mut simulation = Simulation::new(Arc::new(model), options)?;
-            simulation.set_initial(payload.initial)?;
-            simulation.restore(&payload.state)?;
+            let mut simulation = Simulation::in_state(model, options, payload.state)?;
+            simulation.set_initial(Snapshot { model: initial_model, state: payload.initial });
             Ok(simulation)
         };
         continued()

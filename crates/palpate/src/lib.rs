@@ -18,10 +18,15 @@ mod simulation;
 
 pub use checkpoint::CheckpointError;
 pub use palpate_contact as contact;
+pub use palpate_cutting as cutting;
 pub use palpate_geometry as geometry;
 pub use palpate_mechanics as mechanics;
 pub use palpate_model as model;
 
 pub use palpate_contact::{Scene, SceneError, SceneOptions};
+pub use palpate_cutting::{Blade, CutOptions};
 pub use palpate_model::{CoreLoader, Mesh, MeshData, Model, ModelError, load_model};
-pub use simulation::{Simulation, SimulationError, SimulationOptions, StepReport, StepTimes};
+pub use simulation::{
+    BodyChange, ChangeReport, ChangeTimes, Simulation, SimulationError, SimulationOptions,
+    Snapshot, StepReport, StepTimes,
+};

@@ -1,5 +1,6 @@
 //! The step loop: detect, respond, move.
 
+mod change;
 mod hands;
 
 use std::ops::AddAssign;
@@ -7,11 +8,14 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use palpate_contact::{PenetratingNode, ProximityOptions, Scene, SceneError, SceneOptions};
+use palpate_cutting::CutError;
 use palpate_geometry::Point;
 use palpate_mechanics::{
     Contact, Dynamics, DynamicsOptions, Energy, MechanicsError, State, StepStats,
 };
-use palpate_model::Model;
+use palpate_model::{MeshError, Model};
+
+pub use change::{BodyChange, ChangeReport, ChangeTimes, Snapshot};
 
 /// How a simulation runs.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -40,6 +44,31 @@ pub enum SimulationError {
     /// A body cannot be simulated, or a step failed; the state is that before the step.
     #[error(transparent)]
     Mechanics(#[from] MechanicsError),
+    /// A body that could not be cut; nothing has changed.
+    #[error("body {body} cannot be cut: {source}")]
+    Cut {
+        /// Index of the body.
+        body: usize,
+        /// Why not.
+        source: CutError,
+    },
+    /// Tetrahedra that cannot be removed; nothing has changed.
+    #[error("body {body}: {source}")]
+    Removal {
+        /// Index of the body.
+        body: usize,
+        /// Why not.
+        source: MeshError,
+    },
+    /// A rigid body has no tissue to remove.
+    #[error("body {body} is rigid: only deformable bodies can be cut")]
+    RigidBody {
+        /// Index of the body.
+        body: usize,
+    },
+    /// A snapshot of another simulation.
+    #[error("the snapshot is of a simulation of another model")]
+    OtherModel,
     /// A body index that does not exist.
     #[error("body {index} does not exist: the simulation has {count} bodies")]
     NoSuchBody {
@@ -135,7 +164,7 @@ pub struct Simulation {
     options: SimulationOptions,
     scene: Scene,
     dynamics: Dynamics,
-    initial: State,
+    initial: Snapshot,
     /// Copy of the last search: the scene's own list is gone when it searches for close pairs.
     penetration: Vec<PenetratingNode>,
 }
@@ -156,7 +185,7 @@ impl Simulation {
         let scene = Scene::new(meshes, Some(&model.structure), scene_options)?;
         let SimulationOptions { time_step, threads, .. } = options;
         let dynamics = Dynamics::new(&model, DynamicsOptions { time_step, threads })?;
-        let initial = dynamics.state();
+        let initial = Snapshot { model: Arc::clone(&model), state: dynamics.state() };
         Ok(Self { model, options, scene, dynamics, initial, penetration: Vec::new() })
     }
 
@@ -285,37 +314,55 @@ impl Simulation {
         Ok(&mut self.scene)
     }
 
-    /// The whole state, to come back to with [`Self::restore`].
-    pub fn snapshot(&self) -> State {
-        self.dynamics.state()
+    /// Everything, to come back to with [`Self::restore`].
+    pub fn snapshot(&self) -> Snapshot {
+        Snapshot { model: Arc::clone(&self.model), state: self.dynamics.state() }
     }
 
-    /// Returns to a snapshot of this simulation; it continues with the same bits.
+    /// Returns to a snapshot of this simulation; it continues with the same bits. Cuts made since are
+    /// undone, which takes as long as a new simulation.
     ///
     /// # Errors
     /// If the state is of another model.
-    pub fn restore(&mut self, state: &State) -> Result<(), SimulationError> {
-        Ok(self.dynamics.set_state(state)?)
+    pub fn restore(&mut self, snapshot: &Snapshot) -> Result<(), SimulationError> {
+        if Arc::ptr_eq(&snapshot.model, &self.model) {
+            return Ok(self.dynamics.set_state(&snapshot.state)?);
+        }
+        // Cuts leave the bodies there, and only add to them.
+        let mut names = snapshot.model.bodies.iter().map(|body| &body.name);
+        if !self.initial.model.bodies.iter().all(|body| names.next() == Some(&body.name)) {
+            return Err(SimulationError::OtherModel);
+        }
+        self.go_on(snapshot)
     }
 
-    /// Returns to the start.
+    /// Returns to the start, before all cuts.
     ///
     /// # Errors
     /// Never for the simulation's own initial state; kept fallible like [`Self::restore`].
     pub fn reset(&mut self) -> Result<(), SimulationError> {
-        Ok(self.dynamics.set_state(&self.initial)?)
+        self.restore(&self.initial.clone())
     }
 
-    /// The state that [`Self::reset`] returns to.
-    pub(crate) fn initial(&self) -> &State {
+    /// What [`Self::reset`] returns to.
+    pub(crate) fn initial(&self) -> &Snapshot {
         &self.initial
     }
 
-    /// Replaces the state that [`Self::reset`] returns to.
-    pub(crate) fn set_initial(&mut self, state: State) -> Result<(), SimulationError> {
-        self.dynamics.set_state(&state)?;
-        self.initial = state;
-        Ok(())
+    /// Replaces what [`Self::reset`] returns to.
+    pub(crate) fn set_initial(&mut self, initial: Snapshot) {
+        self.initial = initial;
+    }
+
+    /// In a state of `model`, also one after cuts.
+    pub(crate) fn in_state(
+        model: Arc<Model>,
+        options: SimulationOptions,
+        state: State,
+    ) -> Result<Self, SimulationError> {
+        let (scene, dynamics) = change::parts(&model, options, &state)?;
+        let initial = Snapshot { model: Arc::clone(&model), state };
+        Ok(Self { model, options, scene, dynamics, initial, penetration: Vec::new() })
     }
 
     /// Energy of the deformable bodies.

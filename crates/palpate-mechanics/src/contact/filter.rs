@@ -293,13 +293,31 @@ impl Filter {
 
 /// Whether a node and a triangle of one body face each other at rest, as the two lips of a cut do, where
 /// they are closer than any contact distance. On the two sides of a thin wall each is behind the other.
+/// Where the node is closest to an edge or a corner, one of the triangles around it is enough: around
+/// the rim of a lip is skin as well.
 fn are_lips(pair: &ProximityPair, body: &BodyView<'_>) -> bool {
     let mesh = body.surface.mesh();
-    let triangle = body.surface.triangle_normal(pair.elements[1], mesh.nodes());
-    let corner = mesh.triangles()[pair.elements[1] as usize][0];
-    let height = (body.rest(pair.nodes[0]) - body.rest(corner)).dot(triangle);
-    height > -COINCIDENT * body.parameters.mean_edge
-        && body.surface.node_normal(pair.nodes[0], mesh.nodes()).dot(triangle) < LIP_COSINE
+    let node = pair.nodes[0];
+    let normal = body.surface.node_normal(node, mesh.nodes());
+    let faces = |triangle: u32| {
+        let facing = body.surface.triangle_normal(triangle, mesh.nodes());
+        let corner = mesh.triangles()[triangle as usize][0];
+        let height = (body.rest(node) - body.rest(corner)).dot(facing);
+        height > -COINCIDENT * body.parameters.mean_edge && normal.dot(facing) < LIP_COSINE
+    };
+    let weights = &pair.weights[1..];
+    match weights.iter().filter(|&&weight| weight != 0.0).count() {
+        3 => faces(pair.elements[1]),
+        2 => {
+            let zero = weights.iter().position(|&weight| weight == 0.0).unwrap_or(0);
+            let edge = mesh.triangle_edges()[pair.elements[1] as usize][(zero + 1) % 3];
+            body.surface.edge_triangles(edge).iter().any(|&(triangle, _)| faces(triangle))
+        }
+        _ => {
+            let corner = weights.iter().position(|&weight| weight != 0.0).unwrap_or(0);
+            body.surface.node_triangles(pair.nodes[1 + corner]).iter().any(|&t| faces(t))
+        }
+    }
 }
 
 /// Gap and normal of an edge against an edge, if the pair is a contact.

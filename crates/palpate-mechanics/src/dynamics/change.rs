@@ -5,7 +5,7 @@ use palpate_model::{MeshChange, Model};
 use super::{Dynamics, attach};
 use crate::contact::{ContactParameters, Surface};
 use crate::error::MechanicsError;
-use crate::state::ContactForce;
+use crate::state::{BodyState, ContactForce, State};
 
 impl Dynamics {
     /// Goes on with a body whose mesh was changed: `model` is the model after the change, `change` what
@@ -47,6 +47,62 @@ impl Dynamics {
         self.set_contact_forces(&contacts);
         self.response.restore(&contacts);
         Ok(released)
+    }
+}
+
+impl State {
+    /// The state of bodies that are parts of others: for each of them the body before, and what became
+    /// of that one's mesh. Nothing is made of a node that came from between others.
+    ///
+    /// # Panics
+    /// If the parts are not those of the bodies in this state.
+    #[must_use]
+    pub fn of_parts(&self, parts: &[(usize, MeshChange)]) -> Self {
+        let copies: Vec<_> = (parts.iter())
+            .map(|(old, change)| first_copies(self.bodies[*old].positions.len(), change))
+            .collect();
+        let place = |body: u32, node: u32| {
+            let of_body = parts.iter().zip(&copies).enumerate();
+            let mut found = of_body.filter(|(_, ((old, _), _))| *old == body as usize);
+            found.find_map(|(new, (_, copies))| Some((new as u32, copies[node as usize]?)))
+        };
+        let bodies = parts.iter().map(|(old, change)| {
+            let saved = &self.bodies[*old];
+            if change.nodes.len() == saved.positions.len() {
+                return saved.clone();
+            }
+            BodyState {
+                positions: change.positions(&saved.positions),
+                velocities: change.positions(&saved.velocities),
+                forces: change.positions(&saved.forces),
+                stiff_shape: change.positions(&saved.positions),
+                ..BodyState::default()
+            }
+        });
+        let mut state = Self { bodies: bodies.collect(), ..self.clone() };
+        state.contacts.retain_mut(|contact| {
+            let sides = [0, if contact.edges { 2 } else { 1 }];
+            let mut here = contact.bodies;
+            for corner in 0..4 {
+                let side = usize::from(corner >= sides[1]);
+                let Some((body, node)) = place(contact.bodies[side], contact.nodes[corner]) else {
+                    return false;
+                };
+                if corner != sides[side] && body != here[side] {
+                    return false;
+                }
+                here[side] = body;
+                contact.nodes[corner] = node;
+            }
+            contact.bodies = here;
+            true
+        });
+        state.pulls.retain_mut(|pull| {
+            let found = place(pull.body, pull.node);
+            (pull.body, pull.node) = found.unwrap_or((pull.body, pull.node));
+            found.is_some()
+        });
+        state
     }
 }
 

@@ -1,0 +1,251 @@
+//! Cuts, removal and separation while a simulation runs.
+
+use std::sync::Arc;
+
+use palpate::cutting::{Blade, CutOptions};
+use palpate::model::{Body, Law, RigidMotion, write_model};
+use palpate::{
+    CoreLoader, Mesh, MeshData, Model, Simulation, SimulationError, SimulationOptions, load_model,
+};
+
+/// A box of `cells` cubic cells with edge `h` [m], six tetrahedra each.
+fn soft_box(cells: [usize; 3], h: f64, origin: [f64; 3]) -> Arc<Mesh> {
+    let [nx, ny, nz] = cells;
+    let number = |i: usize, j: usize, k: usize| ((i * (ny + 1) + j) * (nz + 1) + k) as u32;
+    let mut data = MeshData::default();
+    for i in 0..=nx {
+        for j in 0..=ny {
+            for k in 0..=nz {
+                let at = [i, j, k].map(|index| index as f64 * h);
+                data.nodes.push(std::array::from_fn(|axis| origin[axis] + at[axis]));
+            }
+        }
+    }
+    let paths = [[1, 3], [3, 2], [2, 6], [6, 4], [4, 5], [5, 1]];
+    for i in 0..nx {
+        for j in 0..ny {
+            for k in 0..nz {
+                let corner = |c: usize| number(i + (c & 1), j + (c >> 1 & 1), k + (c >> 2));
+                for [a, b] in paths {
+                    data.tetrahedra.push([corner(0), corner(a), corner(b), corner(7)]);
+                    data.regions.push(i32::from(i % 2 == 0));
+                }
+            }
+        }
+    }
+    data.node_sets.insert("low".into(), (0..data.nodes.len() as u32).step_by(nz + 1).collect());
+    Arc::new(Mesh::repaired(data).expect("a box is a mesh").0)
+}
+
+/// Two soft boxes, one on the other, on a plate.
+fn model(law: Law) -> Model {
+    let plate = MeshData {
+        nodes: vec![[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]],
+        triangles: vec![[0, 1, 2], [0, 2, 3]],
+        ..MeshData::default()
+    };
+    let mut plate = Body::new("plate", Arc::new(Mesh::new(plate).expect("a plate is a mesh")));
+    plate.rigid = Some(RigidMotion::default());
+    let mut lower = Body::new("lower", soft_box([4, 3, 2], 0.02, [0.0, 0.0, 0.003]));
+    let mut upper = Body::new("upper", soft_box([2, 2, 3], 0.02, [0.02, 0.01, 0.046]));
+    for body in [&mut lower, &mut upper] {
+        body.material.law = law;
+        body.material.young = 2e4;
+        body.material.damping = 0.02;
+        body.regions = vec![(1, body.material)];
+        body.regions[0].1.density = 1100.0;
+        body.processor = Some(3);
+    }
+    Model::from_bodies(vec![lower, upper, plate])
+}
+
+fn start(law: Law) -> Simulation {
+    let mut simulation = Simulation::new(model(law), SimulationOptions::default()).unwrap();
+    run(&mut simulation, 25);
+    simulation
+}
+
+fn run(simulation: &mut Simulation, steps: usize) -> Vec<u64> {
+    for _ in 0..steps {
+        simulation.step().expect("the step succeeds");
+    }
+    bits(simulation)
+}
+
+fn bits(simulation: &Simulation) -> Vec<u64> {
+    (0..simulation.model().bodies.len())
+        .flat_map(|body| simulation.positions(body).as_flattened().to_vec())
+        .map(f64::to_bits)
+        .collect()
+}
+
+/// Through both boxes, at x = `x`, up to y = `depth`.
+fn blade(x: f64, depth: f64) -> Blade {
+    let edge = |y: f64| [[x, y, -0.1], [x + 0.003, y, 0.3]];
+    Blade::stroke(&[edge(-0.1), edge(depth)]).unwrap()
+}
+
+fn cut(simulation: &mut Simulation, blade: &Blade) -> usize {
+    simulation.cut(blade, &CutOptions::default()).unwrap().bodies.len()
+}
+
+#[test]
+fn a_cut_in_contact_goes_on_quietly_and_its_lips_open() {
+    for law in [Law::Linear, Law::NeoHookean] {
+        let mut simulation = start(law);
+        let volume: f64 = simulation.model().bodies[..2].iter().map(|b| b.mesh.volume()).sum();
+        let before: Vec<_> = (0..2).map(|body| simulation.positions(body).to_vec()).collect();
+        assert_eq!(cut(&mut simulation, &blade(0.041, 0.03)), 2);
+        let after: f64 = simulation.model().bodies[..2].iter().map(|b| b.mesh.volume()).sum();
+        assert!((after - volume).abs() < 1e-12 * volume);
+        let body = &simulation.model().bodies[0];
+        assert_eq!(body.mesh.regions().len(), body.mesh.tetrahedra().len());
+        assert!(body.mesh.node_sets()["low"].len() > 12);
+        // Old nodes keep their numbers and have not moved; in a step they move by millimetres at most.
+        for _ in 0..3 {
+            simulation.step().unwrap();
+        }
+        for (body, before) in before.iter().enumerate() {
+            for (old, new) in before.iter().zip(simulation.positions(body)) {
+                let moved = (0..3).map(|k| (new[k] - old[k]).powi(2)).sum::<f64>().sqrt();
+                assert!(moved < 0.004, "{law:?}: {moved} m");
+            }
+        }
+        let scene = simulation.scene().unwrap();
+        for body in 0..3 {
+            assert_eq!(scene.tree(body).validate(scene.mesh(body), scene.positions(body)), Ok(()));
+        }
+        run(&mut simulation, 100);
+        assert!(simulation.velocities(0).as_flattened().iter().all(|v| v.abs() < 0.5));
+    }
+}
+
+#[test]
+fn snapshots_and_checkpoints_hold_the_cuts() {
+    let folder = tempfile::tempdir().unwrap();
+    for law in [Law::Linear, Law::NeoHookean] {
+        let mut simulation = start(law);
+        let whole = simulation.snapshot();
+        assert_eq!(cut(&mut simulation, &blade(0.03, 0.025)), 2);
+        run(&mut simulation, 4);
+        simulation.remove(1, &[5, 6]).unwrap();
+        run(&mut simulation, 2);
+        let snapshot = simulation.snapshot();
+        let path = folder.path().join("cut.palpate");
+        simulation.save(&path).unwrap();
+        let expected = run(&mut simulation, 12);
+
+        let mut loaded = Simulation::load(&path, 2).unwrap();
+        assert_eq!(run(&mut loaded, 12), expected, "{law:?}: from the file");
+        simulation.restore(&snapshot).unwrap();
+        assert_eq!(run(&mut simulation, 12), expected, "{law:?}: from the snapshot");
+
+        // Back before the cut, and cut again: the same.
+        simulation.restore(&whole).unwrap();
+        let nodes = simulation.positions(0).len();
+        assert_eq!(nodes, model(law).bodies[0].mesh.nodes().len());
+        assert_eq!(cut(&mut simulation, &blade(0.03, 0.025)), 2);
+        run(&mut simulation, 4);
+        simulation.remove(1, &[5, 6]).unwrap();
+        run(&mut simulation, 2);
+        assert_eq!(run(&mut simulation, 12), expected, "{law:?}: once more");
+
+        loaded.reset().unwrap();
+        let fresh = Simulation::new(model(law), SimulationOptions::default()).unwrap();
+        assert_eq!(bits(&loaded), bits(&fresh));
+        assert_eq!(run(&mut loaded, 25), {
+            let mut fresh = fresh;
+            run(&mut fresh, 25)
+        });
+    }
+}
+
+#[test]
+fn pieces_become_bodies_of_their_own() {
+    let mut simulation = start(Law::NeoHookean);
+    let pull = simulation.pull(0, 0, [0.0, 0.0, 0.0], 5.0).unwrap();
+    assert!(simulation.separate().unwrap().is_empty());
+    cut(&mut simulation, &blade(0.021, 0.5));
+    let mass = |simulation: &Simulation| -> f64 {
+        let bodies = 0..simulation.model().bodies.len();
+        let masses = bodies.filter_map(|body| simulation.dynamics().masses(body));
+        masses.flatten().sum()
+    };
+    let before = (mass(&simulation), simulation.dynamics().momentum());
+    let parts = simulation.separate().unwrap();
+    let names: Vec<_> = simulation.model().bodies.iter().map(|body| &*body.name).collect();
+    assert_eq!(names[..4], ["lower", "upper", "plate", "lower/2"]);
+    assert_eq!(parts.len(), names.len());
+    assert_eq!(parts[3].0, 0);
+    assert!(parts[0].1.tetrahedra.len() > parts[3].1.tetrahedra.len());
+    for (body, (old, _)) in simulation.model().bodies.iter().zip(&parts) {
+        assert_eq!(body.processor, model(Law::NeoHookean).bodies[*old].processor);
+        assert_eq!(body.mesh.pieces().len().max(1), 1);
+    }
+    assert!((mass(&simulation) - before.0).abs() < 1e-12 * before.0);
+    let momentum = simulation.dynamics().momentum().linear;
+    for k in 0..3 {
+        assert!((momentum[k] - before.1.linear[k]).abs() < 1e-12);
+    }
+    // Node 0 is in the small piece.
+    assert_eq!((simulation.pulls()[0].id, simulation.pulls()[0].body), (pull, 3));
+    let snapshot = simulation.snapshot();
+    let expected = run(&mut simulation, 20);
+    simulation.restore(&snapshot).unwrap();
+    assert_eq!(run(&mut simulation, 20), expected);
+    simulation.reset().unwrap();
+    assert_eq!(simulation.model().bodies.len(), 3);
+}
+
+#[test]
+fn the_model_after_cuts_is_written_and_loaded_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut first = model(Law::NeoHookean);
+    first.bodies[0].fixed_nodes = vec![0, 3, 6];
+    let mut simulation = Simulation::new(first, SimulationOptions::default()).unwrap();
+    run(&mut simulation, 3);
+    cut(&mut simulation, &blade(0.021, 0.5));
+    simulation.separate().unwrap();
+    let path = folder.path().join("after.bml");
+    let files = write_model(&path, simulation.model()).unwrap();
+    assert_eq!(files.len(), simulation.model().bodies.len() + 1);
+    let loaded = load_model(&path, &CoreLoader).unwrap();
+    assert_eq!(loaded.bodies.len(), simulation.model().bodies.len());
+    for old in &simulation.model().bodies {
+        // In the order of the structure.
+        let new = loaded.bodies.iter().find(|new| new.name == old.name).expect("every name");
+        assert_eq!(old.fixed_nodes, new.fixed_nodes);
+        assert_eq!(old.mesh.nodes(), new.mesh.nodes());
+        assert_eq!(old.mesh.tetrahedra(), new.mesh.tetrahedra());
+        assert_eq!(old.mesh.regions(), new.mesh.regions());
+        assert_eq!((old.material, &old.regions), (new.material, &new.regions));
+        assert_eq!((old.contact, old.processor), (new.contact, new.processor));
+        assert_eq!(old.rigid.is_some(), new.rigid.is_some());
+    }
+    let mut again = Simulation::new(loaded, SimulationOptions::default()).unwrap();
+    run(&mut again, 5);
+}
+
+#[test]
+fn what_cannot_be_done_is_refused_and_changes_nothing() {
+    let mut simulation = start(Law::Linear);
+    let before = simulation.snapshot();
+    assert_eq!(cut(&mut simulation, &blade(5.0, 0.5)), 0);
+    let error = |simulation: &mut Simulation, body, tetrahedra: &[u32]| {
+        simulation.remove(body, tetrahedra).unwrap_err().to_string()
+    };
+    let message = error(&mut simulation, 0, &[100_000]);
+    assert!(message.contains("tetrahedron 100000 cannot be removed"), "{message}");
+    let message = error(&mut simulation, 2, &[0]);
+    assert!(message.contains("body 2 is rigid"), "{message}");
+    let message = error(&mut simulation, 7, &[0]);
+    assert!(message.contains("body 7 does not exist"), "{message}");
+    let all: Vec<u32> = (0..simulation.model().bodies[1].mesh.tetrahedra().len() as u32).collect();
+    let message = error(&mut simulation, 1, &all);
+    assert!(message.contains("would leave nothing"), "{message}");
+    assert_eq!(simulation.snapshot().state(), before.state());
+    assert!(Arc::ptr_eq(simulation.snapshot().model(), before.model()));
+    let other = Model::from_bodies(vec![model(Law::Linear).bodies.remove(1)]);
+    let mut other = Simulation::new(other, SimulationOptions::default()).unwrap();
+    assert!(matches!(other.restore(&before), Err(SimulationError::OtherModel)));
+}
