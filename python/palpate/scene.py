@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Sequence
-from typing import Any
+from typing import Any, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -19,6 +19,7 @@ from palpate.contacts import (
     Proximity,
     RayHits,
 )
+from palpate.cutting import Blade, BodyCut, MeshChange, as_blade, chosen, cut_options
 from palpate.mesh import Mesh, as_mesh
 from palpate.model import Body, Model, body_index, read_model
 
@@ -107,11 +108,68 @@ class Scene:
         self._names.append(_unique(name or default, self._names))
         return index
 
-    def remove(self, body: int | str) -> None:
-        """Remove a body; those after it move down by one index."""
+    @overload
+    def remove(self, body: int | str) -> None: ...
+    @overload
+    def remove(self, body: int | str, tetrahedra: npt.ArrayLike) -> MeshChange: ...
+    def remove(self, body: int | str, tetrahedra: npt.ArrayLike | None = None) -> MeshChange | None:
+        """Remove a body, or some tetrahedra of it.
+
+        Bodies after a removed one move down by one index. ``tetrahedra`` are indices or a mask;
+        their nodes stay where they are, and the bounding tree is kept.
+        """
         index = body_index(self._names, body)
-        self._core.remove(index)
-        del self._meshes[index], self._names[index]
+        if tetrahedra is None:
+            self._core.remove(index)
+            del self._meshes[index], self._names[index]
+            return None
+        count = len(self._meshes[index].tetrahedra)
+        row = self._core.remove_tetrahedra(index, chosen(tetrahedra, count))
+        change = MeshChange._from_core(row)
+        self._meshes[index] = change.mesh
+        return change
+
+    def cut(
+        self,
+        blade: Blade,
+        *,
+        bodies: Iterable[int | str] | None = None,
+        snap: float | None = None,
+        min_quality: float | None = None,
+        min_edge: float | None = None,
+    ) -> tuple[BodyCut, ...]:
+        """Cut bodies of tetrahedra along a blade, where they are now.
+
+        The bounding trees are kept: tetrahedra stay in their leaves, parts of one in its leaf.
+        Ignored pairs stay ignored; groups stay with what is left of a surface triangle, and new
+        surface is in none.
+
+        Parameters
+        ----------
+        blade : Blade
+            In the space of the positions [m].
+        bodies : iterable of int or str, optional
+            All bodies with tetrahedra unless given.
+        snap, min_quality, min_edge
+            As in `Simulation.cut`.
+
+        Returns
+        -------
+        tuple of BodyCut
+            The bodies that changed. Later updates take positions for their new meshes.
+        """
+        solid = (i for i, mesh in enumerate(self._meshes) if len(mesh.tetrahedra))
+        chosen_bodies: list[int] = (
+            list(solid) if bodies is None else [body_index(self._names, each) for each in bodies]
+        )
+        options = cut_options(snap, min_quality, min_edge)
+        rows = self._core.cut(as_blade(blade)._core, sorted(set(chosen_bodies)), options)
+        cuts = tuple(
+            BodyCut(body, MeshChange._from_core(change), **report) for body, change, report in rows
+        )
+        for each in cuts:
+            self._meshes[each.body] = each.change.mesh
+        return cuts
 
     def replace(self, body: int | str, mesh: Mesh) -> None:
         """Give a body another mesh (after a change of topology); its positions are the mesh's."""

@@ -13,6 +13,16 @@ import numpy.typing as npt
 from palpate import _arrays, _core
 from palpate._arrays import Float64Array, IndexArray
 from palpate.contacts import DetectionStats, Intersections
+from palpate.cutting import (
+    Blade,
+    BodyCut,
+    CutReport,
+    MeshChange,
+    RemovalReport,
+    as_blade,
+    chosen,
+    cut_options,
+)
 from palpate.hands import Pull, Tool
 from palpate.mesh import Mesh
 from palpate.model import Body, Model, body_index, read_model
@@ -126,13 +136,18 @@ class Simulation:
 
     def _start(self, core: _core.Simulation) -> None:
         self._core = core
+        self._changed()
+
+    def _changed(self) -> None:
+        """Look at the model again: cuts change it."""
+        core = self._core
         self._model = Model._from_core(core.model)
         self._names = [body.name for body in self._model.bodies]
         self._counts = [len(body.mesh.nodes) for body in self._model.bodies]
 
     @property
     def model(self) -> Model:
-        """The model that is simulated."""
+        """The model that is simulated, with the cuts that were made."""
         return self._model
 
     @property
@@ -226,6 +241,100 @@ class Simulation:
         identity = self._core.pull(index, node, goal, _arrays.scalar(stiffness, "stiffness"))
         return Pull(self._core, identity)
 
+    def cut(
+        self,
+        blade: Blade,
+        *,
+        snap: float | None = None,
+        min_quality: float | None = None,
+        min_edge: float | None = None,
+    ) -> CutReport:
+        """Cut all deformable bodies along a blade, where they are now.
+
+        The next step goes on with the new surfaces; both lips of the cut touch each other. Node and
+        tetrahedron numbers that were there stay; what is new comes after them. `model` and the
+        shapes of all arrays are new, fixed nodes, regions and fibres follow.
+
+        Parameters
+        ----------
+        blade : Blade
+            In the space of the bodies [m].
+        snap : float
+            A node closer to the blade than this part of an edge counts as on the blade, 0 to 0.5.
+        min_quality : float
+            Smallest radius ratio of the parts of split tetrahedra, 0 to 1.
+        min_edge : float
+            Shortest part of a split edge [m]; 0 for no bound.
+
+        Returns
+        -------
+        CutReport
+            Empty when the blade passed everything by. `BodyCut.change` maps arrays of yours.
+
+        Raises
+        ------
+        SimulationError
+            If a body cannot be cut or simulated afterwards; nothing has changed then.
+        """
+        rows, times = self._core.cut(
+            as_blade(blade)._core, cut_options(snap, min_quality, min_edge)
+        )
+        if rows:
+            self._changed()
+        bodies = tuple(
+            BodyCut(body, MeshChange._from_core(change), **(cut or {}), released=len(released))
+            for body, change, cut, released in rows
+        )
+        return CutReport(bodies, times)
+
+    def remove(self, body: int | str, tetrahedra: npt.ArrayLike) -> RemovalReport:
+        """Remove tetrahedra of a deformable body, as cautery or resection does.
+
+        Parameters
+        ----------
+        body : int or str
+            The body, by index or name.
+        tetrahedra : (k,) integers, or a mask of shape (m,)
+            Which ones; not all. Nodes that no tetrahedron is left of go as well.
+
+        Raises
+        ------
+        SimulationError
+            If one is named twice or none would be left; nothing has changed then.
+        IndexError
+            If there is no such tetrahedron.
+        """
+        index = self._index(body)
+        count = len(self._model.bodies[index].mesh.tetrahedra)
+        rows, times = self._core.remove(index, chosen(tetrahedra, count))
+        self._changed()
+        ((_, change, _, released),) = rows
+        return RemovalReport(index, MeshChange._from_core(change), len(released), times)
+
+    def separate(self) -> list[tuple[int, MeshChange]]:
+        """Make every piece that has come apart a body of its own, in the same state.
+
+        The largest piece keeps the body's index and name; the others come last, named ``kidney/2``
+        and so on, with the same material, processor and looks.
+
+        Returns
+        -------
+        list of (int, MeshChange)
+            For each body now the index of the one before, and what became of its mesh; empty when
+            nothing has come apart.
+        """
+        parts = self._core.separate()
+        if parts:
+            self._changed()
+        return [(old, MeshChange._from_core(change)) for old, change in parts]
+
+    def write_model(self, path: str | os.PathLike[str]) -> list[str]:
+        """Write the model as it is now, cuts included: a ``.bml`` and a ``.seg`` for each body.
+
+        Meshes are written at rest, in metres, beside ``path``. Returns all files.
+        """
+        return [os.fspath(file) for file in self._core.write_model(os.fspath(path))]
+
     def tool(self, name: int | str) -> Tool:
         """A rigid body as a tool: move it by `Tool.set_pose`, read its `Tool.force`."""
         index = self._index(name)
@@ -251,14 +360,19 @@ class Simulation:
         return Snapshot(self._core.snapshot())
 
     def restore(self, snapshot: Snapshot) -> None:
-        """Return to a snapshot of this simulation; it continues with the same bits."""
+        """Return to a snapshot of this simulation; it continues with the same bits.
+
+        Cuts made since are undone.
+        """
         if not isinstance(snapshot, Snapshot):
             raise TypeError(f"snapshot: expected a Snapshot, got {type(snapshot).__name__}")
         self._core.restore(snapshot._core)
+        self._changed()
 
     def reset(self) -> None:
-        """Return to the start."""
+        """Return to the start, before all cuts."""
         self._core.reset()
+        self._changed()
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write a checkpoint: model, meshes and state in one file, complete or absent."""

@@ -6,6 +6,7 @@
 #![allow(clippy::needless_pass_by_value)]
 
 mod arrays;
+mod cutting;
 mod errors;
 mod mesh;
 mod model;
@@ -17,6 +18,8 @@ mod simulation;
 mod _core {
     use pyo3::prelude::*;
 
+    #[pymodule_export]
+    use crate::cutting::{PyBlade, read_blades};
     #[pymodule_export]
     use crate::mesh::{PyMesh, read_mesh_file, write_mesh_file};
     #[pymodule_export]

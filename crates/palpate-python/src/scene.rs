@@ -8,6 +8,7 @@ use std::time::Duration;
 
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2};
 use palpate::contact::{IntersectionOptions, Method, ProximityOptions, Split};
+use palpate::cutting::cut;
 use palpate::geometry::Point;
 use palpate::{Scene, SceneOptions};
 use pyo3::exceptions::PyValueError;
@@ -15,6 +16,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 
 use crate::arrays::{matrix, points, rows, vector};
+use crate::cutting::{self, ChangeColumns, Options, PyBlade, change_columns, report_row};
 use crate::errors::raise;
 use crate::mesh::PyMesh;
 use crate::model::structure_from_python;
@@ -22,6 +24,9 @@ use crate::model::structure_from_python;
 use points::{PenetrationArrays, SurfacePointArrays, penetration_arrays, surface_point_arrays};
 use queries::{IntersectionColumns, ProximityColumns, stats_row};
 pub(crate) use queries::{StatsRow, intersection_rows};
+
+/// Body, what became of its mesh, what the cut did.
+type CutRow<'py> = (usize, ChangeColumns<'py>, Bound<'py, PyDict>);
 
 /// Bodies and their bounding trees. The lock lets two Python threads use one scene in turn.
 #[pyclass(frozen, name = "Scene", module = "palpate._core")]
@@ -68,6 +73,51 @@ impl PyScene {
         let mesh = mesh.mesh.clone();
         raise(py, py.detach(|| self.lock().0.replace(body, mesh)))?;
         Ok(())
+    }
+
+    /// Cuts the bodies along a blade; body, what became of its mesh, what the cut did.
+    fn cut<'py>(
+        &self,
+        py: Python<'py>,
+        blade: &PyBlade,
+        bodies: Vec<usize>,
+        options: Options,
+    ) -> PyResult<Vec<CutRow<'py>>> {
+        let options = cutting::options(options);
+        let cuts = py.detach(|| {
+            let mut guard = self.lock();
+            let scene = &mut guard.0;
+            let mut cuts = Vec::new();
+            for body in bodies {
+                let found = cut(scene.mesh(body), scene.positions(body), &blade.blade, &options);
+                let named = |error| format!("body {body} cannot be cut: {error}");
+                if let Some(found) = found.map_err(named)? {
+                    cuts.push((body, found));
+                }
+            }
+            for (body, found) in &cuts {
+                let changed = scene.change_body(*body, &found.change);
+                changed.map_err(|error| error.to_string())?;
+            }
+            Ok(cuts)
+        });
+        let rows = cuts.map_err(|message: String| PyValueError::new_err(message))?;
+        rows.iter()
+            .map(|(body, found)| {
+                Ok((*body, change_columns(py, &found.change)?, report_row(py, &found.report)?))
+            })
+            .collect()
+    }
+
+    fn remove_tetrahedra<'py>(
+        &self,
+        py: Python<'py>,
+        body: usize,
+        tetrahedra: Vec<u32>,
+    ) -> PyResult<ChangeColumns<'py>> {
+        let change = raise(py, self.lock().0.mesh(body).remove(&tetrahedra))?;
+        raise(py, py.detach(|| self.lock().0.change_body(body, &change)))?;
+        change_columns(py, &change)
     }
 
     fn update(&self, py: Python<'_>, positions: Vec<PyReadonlyArray2<'_, f64>>) -> PyResult<()> {

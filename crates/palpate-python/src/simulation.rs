@@ -8,12 +8,13 @@ use glam::DQuat;
 use numpy::{PyArray1, PyArray2, PyReadonlyArray2};
 use palpate::contact::{IntersectionOptions, PairKind};
 use palpate::geometry::Point;
-use palpate::mechanics::{Pull, State};
-use palpate::{Simulation, SimulationOptions, StepReport, StepTimes};
+use palpate::mechanics::Pull;
+use palpate::{ChangeReport, Simulation, SimulationOptions, Snapshot, StepReport, StepTimes};
 use pyo3::prelude::*;
 use pyo3::types::{IntoPyDict, PyDict, PyTuple};
 
 use crate::arrays::{index_matrix, matrix, points, vector};
+use crate::cutting::{self, ChangeColumns, Options, PyBlade, change_columns, report_row};
 use crate::errors::raise;
 use crate::model::PyModel;
 use crate::scene::{StatsRow, intersection_rows, scene_options};
@@ -21,14 +22,14 @@ use crate::scene::{StatsRow, intersection_rows, scene_options};
 /// A state to come back to.
 #[pyclass(frozen, name = "Snapshot", module = "palpate._core")]
 pub(crate) struct PySnapshot {
-    state: State,
+    snapshot: Snapshot,
 }
 
 #[pymethods]
 impl PySnapshot {
     #[getter]
     fn time(&self) -> f64 {
-        self.state.time
+        self.snapshot.state().time
     }
 }
 
@@ -57,6 +58,30 @@ impl PySimulation {
 }
 
 type Vec3 = (f64, f64, f64);
+
+/// Body, what became of its mesh, what the cut did, springs that were released.
+type BodyChangeRow<'py> = (usize, ChangeColumns<'py>, Option<Bound<'py, PyDict>>, Vec<u64>);
+
+/// What a change did to each body, and the seconds of its stages.
+type ChangeRows<'py> = (Vec<BodyChangeRow<'py>>, Bound<'py, PyDict>);
+
+fn change_rows<'py>(py: Python<'py>, report: &ChangeReport) -> PyResult<ChangeRows<'py>> {
+    let rows = report.bodies.iter().map(|each| {
+        let cut = each.report.as_ref().map(|report| report_row(py, report)).transpose()?;
+        Ok((each.body, change_columns(py, &each.change)?, cut, each.released.clone()))
+    });
+    let times = report.times;
+    let seconds = PyDict::new(py);
+    for (stage, time) in [
+        ("cutting", times.cutting),
+        ("detection", times.detection),
+        ("mechanics", times.mechanics),
+        ("total", times.total),
+    ] {
+        seconds.set_item(stage, time.as_secs_f64())?;
+    }
+    Ok((rows.collect::<PyResult<_>>()?, seconds))
+}
 
 /// The columns of `palpate.Contacts`.
 type ContactColumns<'py> = (
@@ -229,6 +254,39 @@ impl PySimulation {
         Ok((force.into(), torque.into()))
     }
 
+    fn cut<'py>(
+        &self,
+        py: Python<'py>,
+        blade: &PyBlade,
+        options: Options,
+    ) -> PyResult<ChangeRows<'py>> {
+        let options = cutting::options(options);
+        let report = raise(py, py.detach(|| self.lock().cut(&blade.blade, &options)))?;
+        change_rows(py, &report)
+    }
+
+    fn remove<'py>(
+        &self,
+        py: Python<'py>,
+        body: usize,
+        tetrahedra: Vec<u32>,
+    ) -> PyResult<ChangeRows<'py>> {
+        let report = raise(py, py.detach(|| self.lock().remove(body, &tetrahedra)))?;
+        change_rows(py, &report)
+    }
+
+    /// For each body now the one before and what became of its mesh; empty when nothing came apart.
+    fn separate<'py>(&self, py: Python<'py>) -> PyResult<Vec<(usize, ChangeColumns<'py>)>> {
+        let parts = raise(py, py.detach(|| self.lock().separate()))?;
+        parts.iter().map(|(old, change)| Ok((*old, change_columns(py, change)?))).collect()
+    }
+
+    /// Writes the model as it is now; returns the files.
+    fn write_model(&self, py: Python<'_>, path: PathBuf) -> PyResult<Vec<PathBuf>> {
+        let model = self.lock().model().clone();
+        raise(py, py.detach(|| palpate::model::write_model(&path, &model)))
+    }
+
     fn set_positions(
         &self,
         py: Python<'_>,
@@ -288,15 +346,15 @@ impl PySimulation {
     }
 
     fn snapshot(&self) -> PySnapshot {
-        PySnapshot { state: self.lock().snapshot() }
+        PySnapshot { snapshot: self.lock().snapshot() }
     }
 
     fn restore(&self, py: Python<'_>, snapshot: &PySnapshot) -> PyResult<()> {
-        raise(py, self.lock().restore(&snapshot.state))
+        raise(py, py.detach(|| self.lock().restore(&snapshot.snapshot)))
     }
 
     fn reset(&self, py: Python<'_>) -> PyResult<()> {
-        raise(py, self.lock().reset())
+        raise(py, py.detach(|| self.lock().reset()))
     }
 
     fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {

@@ -7,7 +7,7 @@ import platform
 import signal
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -17,6 +17,7 @@ import numpy as np
 
 from palpate import _core
 from palpate.cli.output import console, plain
+from palpate.cutting import Stroke
 from palpate.errors import SimulationError
 from palpate.results.album import PICTURES, Album
 from palpate.results.atomic import write_bytes
@@ -38,18 +39,27 @@ class RunOptions:
     method: str | None
     checkpoint: bool
     pictures: bool
+    cut: str | None = None
 
 
 class Run:
     """One run into one folder; ``files`` are those written, by what they are."""
 
     def __init__(
-        self, simulation: Simulation, folder: Path, options: RunOptions, *, quiet: bool
+        self,
+        simulation: Simulation,
+        folder: Path,
+        options: RunOptions,
+        *,
+        quiet: bool,
+        strokes: Sequence[Stroke] = (),
     ) -> None:
         self._simulation = simulation
         self._folder = folder
         self._options = options
         self._quiet = quiet
+        self._waiting = list(strokes)
+        self._cuts: list[dict[str, Any]] = []
         self.files: dict[str, Path] = {}
         folder.mkdir(parents=True, exist_ok=True)
         pictures = [folder / "pictures" / f"{name}.png" for name in PICTURES]
@@ -69,6 +79,7 @@ class Run:
         with _stop_signal() as stop, _progress(options.steps, quiet=self._quiet) as advance:
             for step in range(1, options.steps + 1):
                 try:
+                    self._cut(step - 1)
                     record.add(simulation.step(), simulation)
                 except SimulationError as error:
                     failure = str(error)
@@ -99,6 +110,7 @@ class Run:
                 "end_time": simulation.time,
                 "wall_time": time.perf_counter() - started,
                 "frame_count": len(frames),
+                "cuts": self._cuts,
                 "scene": {
                     "up": upward(simulation.model.gravity),
                     "bodies": [asdict(look) for look in looks_of(simulation.model.bodies)],
@@ -111,6 +123,38 @@ class Run:
             if options.pictures:
                 self.files["pictures"] = album.write(self._folder / "pictures")[-1]
         return report
+
+    def _cut(self, step: int) -> None:
+        """Make the strokes whose turn it is before this step, counted from 0."""
+        now = self._simulation.time + 1e-9 * self._simulation.time_step
+
+        def is_due(stroke: Stroke) -> bool:
+            return step >= stroke.step if stroke.step is not None else now >= (stroke.time or 0.0)
+
+        due = [stroke for stroke in self._waiting if is_due(stroke)]
+        self._waiting = [stroke for stroke in self._waiting if not is_due(stroke)]
+        for stroke in due:
+            report = self._simulation.cut(stroke.blade)
+            bodies = self._simulation.model.bodies
+            self._cuts.append(
+                {
+                    "line": stroke.line,
+                    "step": step,
+                    "time": self._simulation.time,
+                    "seconds": report.times,
+                    "bodies": [
+                        {
+                            "name": bodies[each.body].name,
+                            "new_nodes": each.new_nodes,
+                            "new_tetrahedra": each.new_tetrahedra,
+                            "pieces": each.pieces,
+                            "cut_area": each.cut_area,
+                            "smallest_quality": each.smallest_quality,
+                        }
+                        for each in report.bodies
+                    ],
+                }
+            )
 
 
 def versions() -> dict[str, str]:

@@ -23,6 +23,7 @@ from palpate.cli.output import (
 )
 from palpate.cli.run import Run, RunOptions
 from palpate.cli.summary import print_profile, print_summary
+from palpate.cutting import read_blades
 from palpate.model import Model
 from palpate.simulation import Simulation
 
@@ -56,6 +57,10 @@ def simulate(
         Method | None,
         typer.Option(help="How touching triangles are found; wide unless given."),
     ] = None,
+    cut: Annotated[
+        Path | None,
+        typer.Option(help="Cut as this file of blade strokes says.", show_default=False),
+    ] = None,
     checkpoint: Annotated[
         bool, typer.Option("--checkpoint", help="Save OUTPUT/checkpoint.palpate at the end.")
     ] = False,
@@ -77,6 +82,8 @@ def simulate(
 
     Example: palpate simulate scene.bml --time-step 1/120 --every 2 --checkpoint
 
+    Example: palpate simulate case2 --cut strokes.blade
+
     Example: palpate simulate --resume out/checkpoint.palpate --output more
     """
     if model is None and resume is None:
@@ -85,6 +92,7 @@ def simulate(
         raise typer.BadParameter(
             "a checkpoint has its own: leave out --time-step, --leaf-size and --method"
         )
+    strokes = [] if cut is None else read_blades(cut)
     simulation, notes = _start(model, resume, time_step or 1 / 60, threads, leaf_size, method)
     steps = max(1, math.ceil(duration / simulation.time_step - 1e-9))
     options = RunOptions(
@@ -96,8 +104,9 @@ def simulate(
         method=None if method is None else method.value,
         checkpoint=checkpoint,
         pictures=not no_pictures and pictures.available(),
+        cut=None if cut is None else str(cut),
     )
-    run = Run(simulation, output, options, quiet=json_output)
+    run = Run(simulation, output, options, quiet=json_output, strokes=strokes)
     if not no_pictures and not options.pictures:
         notes = (*notes, "no pictures without matplotlib: pip install 'palpate[plot]'")
     for note in notes:

@@ -24,15 +24,19 @@ class FrameSeries:
 
     def __init__(self, folder: Path, model: Model) -> None:
         self._folder = folder
-        self._rest = np.concatenate([body.mesh.nodes for body in model.bodies])
-        counts = [len(body.mesh.nodes) for body in model.bodies]
-        self._offsets = np.concatenate([[0], np.cumsum(counts)])
-        self._grid = _grid(model, self._offsets)
+        self._set_model(model)
         self._frames: list[tuple[float, str]] = []
         self._indexed = time.monotonic()
         (folder / "frames").mkdir(parents=True, exist_ok=True)
         for old in [folder / "simulation.pvd", *(folder / "frames").glob("frame_*.vtu")]:
             old.unlink(missing_ok=True)
+
+    def _set_model(self, model: Model) -> None:
+        self._model = model
+        self._rest = np.concatenate([body.mesh.nodes for body in model.bodies])
+        counts = [len(body.mesh.nodes) for body in model.bodies]
+        self._offsets = np.concatenate([[0], np.cumsum(counts)])
+        self._grid = _grid(model, self._offsets)
 
     def __len__(self) -> int:
         return len(self._frames)
@@ -44,6 +48,8 @@ class FrameSeries:
 
     def add(self, simulation: Simulation) -> None:
         """Write the present state."""
+        if simulation.model is not self._model:  # it was cut
+            self._set_model(simulation.model)
         name = f"frames/frame_{len(self._frames):05d}.vtu"
         points = np.concatenate(simulation.positions)
         data = {

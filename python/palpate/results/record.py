@@ -33,20 +33,23 @@ class Record:
 
     def __init__(self, simulation: Simulation) -> None:
         self._model: Model = simulation.model
+        self._rest: dict[str, float] = {}
         self._times: dict[str, list[float]] = {}
         self._stages: dict[str, list[float]] = {}
         self._steps: dict[str, list[Any]] = {name: [] for name in _SERIES}
         self._energies: dict[str, list[float]] = {}
-        self._rest = [
-            float(signed_volumes(body.mesh.nodes, body.mesh.tetrahedra).sum())
-            for body in self._model.bodies
-        ]
+        self._measure_rest()
         self._volumes: dict[str, list[float]] = {
             body.name: [] for body in self._model.bodies if _soft_solid(body)
         }
         self._inverted = dict.fromkeys(self._volumes, 0)
         self._speeds: dict[str, float] = {}
         self.observe(simulation)
+
+    def _measure_rest(self) -> None:
+        for body in self._model.bodies:
+            volumes = signed_volumes(body.mesh.nodes, body.mesh.tetrahedra)
+            self._rest[body.name] = float(volumes.sum())
 
     def __len__(self) -> int:
         return len(self._steps["time"])
@@ -64,6 +67,9 @@ class Record:
 
     def observe(self, simulation: Simulation) -> None:
         """Measure volumes, inverted tetrahedra and speeds of the present state."""
+        if simulation.model is not self._model:  # it was cut
+            self._model = simulation.model
+            self._measure_rest()
         for index, body in enumerate(self._model.bodies):
             if body.rigid is not None:
                 continue
@@ -71,7 +77,7 @@ class Record:
             self._speeds[body.name] = float(np.sqrt((velocities**2).sum(axis=1).max()))
             if body.name in self._volumes:
                 volumes = signed_volumes(simulation.positions[index], body.mesh.tetrahedra)
-                change = float(volumes.sum()) / self._rest[index] - 1
+                change = float(volumes.sum()) / self._rest[body.name] - 1
                 self._volumes[body.name].append(100 * change)
                 self._inverted[body.name] = int((volumes <= 0).sum())
 

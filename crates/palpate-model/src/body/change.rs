@@ -42,6 +42,9 @@ impl Model {
     ///
     /// The largest piece keeps index and name, the others come after all bodies, named `kidney/2` and so on, by
     /// their size. Settings and attachments go with the pieces.
+    ///
+    /// # Panics
+    /// Never: what is left of a mesh is a mesh.
     pub fn separated(&self) -> Option<(Self, Vec<(usize, MeshChange)>)> {
         let identity = |(index, body): (usize, &Body)| (index, MeshChange::identity(&body.mesh));
         let mut parts: Vec<_> = self.bodies.iter().enumerate().map(identity).collect();

@@ -7,7 +7,8 @@ use super::{FileError, write_mesh, write_whole};
 use crate::body::{Attachment, Body, Material, Model, Structure};
 use crate::language::{
     AppearanceEntries, AttachmentEntries, Block, Branch, ContactEntries, Document, Fixed,
-    FixedRegion, MaterialEntries, PathKey, RegionEntries, Rotation, Settings, Transform, Tree,
+    FixedRegion, MaterialEntries, PathKey, RegionEntries, Rotation, Settings, Span, Transform,
+    Tree,
 };
 use crate::mesh::{Mesh, MeshError};
 
@@ -129,7 +130,7 @@ fn tree(body: &Body, file: String) -> Tree {
             key.rotation.z,
         ]),
     };
-    let fixed = Fixed { region: FixedRegion::Set(FIXED.into()), span: Default::default() };
+    let fixed = Fixed { region: FixedRegion::Set(FIXED.into()), span: Span::default() };
     Tree {
         name: Some(body.name.clone()),
         settings,

@@ -6,7 +6,7 @@
 
 use std::sync::Arc;
 
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 use palpate_geometry::Point;
 use palpate_model::Body;
 use palpate_solver::BlockMatrix;
