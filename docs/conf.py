@@ -4,7 +4,9 @@ import re
 import sys
 from pathlib import Path
 
+from docutils.nodes import Element
 from sphinx.application import Sphinx
+from sphinx.environment import BuildEnvironment
 from sphinx.util.inspect import TypeAliasForwardRef
 
 import palpate
@@ -59,6 +61,12 @@ def _name_files(_app: Sphinx, page: str, source: list[str]) -> None:
     source[0] = _LINK_OUTSIDE.sub(name, source[0])
 
 
+def _as_it_is(_app: Sphinx, _env: BuildEnvironment, node: Element, text: Element) -> Element | None:
+    """What stands between backticks in a docstring and is no name of ours, as it is."""
+    return text if node.get("reftype") == "any" else None
+
+
 def setup(app: Sphinx) -> None:
     """Called by Sphinx."""
+    app.connect("missing-reference", _as_it_is)
     app.connect("source-read", _name_files)

@@ -348,7 +348,7 @@ class Simulation:
 
     @property
     def factor_bytes(self) -> tuple[int, ...]:
-        """Bytes of each body's factored matrix: what a solve has to read at least once."""
+        """Bytes of each body's factored matrix, what a solve has to read at least once."""
         return tuple(self._core.factor_bytes())
 
     def energy(self) -> dict[str, float]:
