@@ -379,7 +379,7 @@ def test_the_probe_presses_where_it_is_led(viewer):
     before = viewer.arrays("frame")["positions"].copy()
     lead = {"type": "tool", "direction": [0, 0, -1], "radius": 0.005}
     viewer.send({**lead, "tip": shifted(at, 0.004)})
-    assert viewer.header("scene")["bodies"][-1]["name"] == "probe"
+    assert viewer.header("scene")["bodies"][-1]["name"] == "viewer probe"
     assert np.array_equal(viewer.arrays("frame")["positions"][: len(before)], before)
     viewer.send({**lead, "tip": shifted(at, -0.01)})
     viewer.send({"type": "step", "count": 12})
@@ -398,6 +398,76 @@ def test_the_probe_presses_where_it_is_led(viewer):
     viewer.send({"type": "reset"})
     viewer.send({"type": "step", "count": 2})
     assert viewer.header("frame")["numbers"]["penetrating_nodes"] == 0
+
+
+def stroke_through(viewer, body):
+    """Edges of a blade that passes through the middle of a body, across x."""
+    start = sum(len(viewer.arrays("scene")[f"rest/{i}"]) for i in range(body))
+    count = len(viewer.arrays("scene")[f"rest/{body}"])
+    part = viewer.arrays("frame")["positions"][start : start + count].astype(np.float64)
+    middle, half = (part.min(axis=0) + part.max(axis=0)) / 2, np.ptp(part, axis=0) / 2 + 0.003
+    return [
+        [
+            [middle[0], middle[1] + side * half[1], middle[2] + half[2]],
+            [middle[0], middle[1] + side * half[1], middle[2] - half[2]],
+        ]
+        for side in (-1.0, -0.3, 0.3, 1.0)
+    ]
+
+
+def test_a_stroke_cuts_and_undo_mends(viewer):
+    viewer.send({"type": "step", "count": 25})
+    whole, before = viewer.arrays("scene"), viewer.arrays("frame")["positions"].copy()
+    version = viewer.header("scene")["version"]
+    viewer.send({"type": "cut", "edges": stroke_through(viewer, 2)})
+    assert "upper" in viewer.header("notice")["text"]
+    assert viewer.header("scene")["version"] > version
+    assert viewer.header("frame")["version"] == viewer.header("scene")["version"]
+    assert len(viewer.arrays("scene")["triangles/2"]) > len(whole["triangles/2"])
+    assert np.array_equal(viewer.arrays("scene")["triangles/3"], whole["triangles/3"])
+    assert viewer.header("state")["undo"] == 1
+    viewer.send({"type": "step", "count": 5})
+    assert np.isfinite(viewer.arrays("frame")["positions"]).all()
+    viewer.send({"type": "separate"})
+    names = [body["name"] for body in viewer.header("scene")["bodies"]]
+    assert names[:4] == ["lower", "middle", "upper", "tray"]
+    assert len(names) > 4
+    for _ in range(2):
+        viewer.send({"type": "undo"})
+    assert viewer.header("state")["undo"] == 0
+    assert np.array_equal(viewer.arrays("frame")["positions"], before)
+    for name, array in whole.items():
+        assert np.array_equal(viewer.arrays("scene")[name], array)
+    far = (np.array(stroke_through(viewer, 2)) + 1).tolist()
+    viewer.send({"type": "cut", "edges": far})
+    assert "no tissue" in viewer.header("notice")["text"]
+    assert viewer.header("state")["undo"] == 0
+
+
+def test_cuts_stay_when_settings_change_and_go_with_a_reset(viewer):
+    whole = viewer.arrays("scene")
+    viewer.send({"type": "step", "count": 10})
+    viewer.send({"type": "cut", "edges": stroke_through(viewer, 0)})
+    viewer.send({"type": "separate"})
+    cut = viewer.arrays("scene")
+    before = viewer.arrays("frame")["positions"].copy()
+    viewer.send({"type": "settings", "body": 0, "material": {"young": 9000}})
+    assert "undone" in viewer.header("notice")["text"]
+    assert viewer.header("state")["undo"] == 0
+    assert np.array_equal(viewer.arrays("frame")["positions"], before)
+    assert {name: len(array) for name, array in viewer.arrays("scene").items()} == {
+        name: len(array) for name, array in cut.items()
+    }
+    # The probe is added behind the pieces, and found again.
+    tip = {"type": "tool", "tip": [0, 0, 0.3], "direction": [0, 0, -1], "radius": 0.004}
+    viewer.send(tip)
+    viewer.send({"type": "step", "count": 2})
+    assert viewer.header("scene")["bodies"][-1]["name"] == "viewer probe"
+    assert np.abs(viewer.arrays("frame")["positions"][: len(before)] - before).max() < 0.05
+    viewer.send({"type": "reset"})
+    assert viewer.header("state")["bodies"][0]["material"]["young"] == 9000
+    for name, array in whole.items():
+        assert np.array_equal(viewer.arrays("scene")[name], array)
 
 
 def test_a_model_error_is_shown_and_mended(tmp_path):

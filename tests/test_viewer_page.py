@@ -199,6 +199,23 @@ def test_tissue_is_pushed(page):
     page.wait("palpate.last.header.tool === null")
 
 
+def test_tissue_is_cut_and_mended(page):
+    page.key("4")
+    assert page.run("palpate.mode") == "cut"
+    triangles = page.run("palpate.stage.triangleCount")
+    x, y = place_on_screen(page, 2)
+    page.mouse("mousePressed", x - 110, y)
+    for step in range(12):
+        page.mouse("mouseMoved", x - 110 + 20 * step, y + step)
+    page.mouse("mouseReleased", x + 110, y + 11)
+    page.wait("palpate.state.undo === 1")
+    page.wait(f"palpate.stage.triangleCount > {triangles}")
+    page.wait("/cm² cut/.test(document.getElementById('toasts').textContent)")
+    page.wait("palpate.last.header.version === palpate.version")
+    page.key("z")
+    page.wait(f"palpate.state.undo === 0 && palpate.stage.triangleCount === {triangles}")
+
+
 def test_two_pages_and_a_lost_server(browser, page, served):
     other = browser.open(served.url)
     other.wait("globalThis.palpate?.received > 0")

@@ -76,7 +76,7 @@ def _reach(model: Model, tie: Attachment) -> float:
 def transferred(
     before: Simulation, model: Model, make: Callable[[Model], Simulation]
 ) -> Simulation:
-    """A simulation of ``model``, whose first bodies are those of ``before``, in its state.
+    """A simulation of ``model`` in the state of ``before``, body by body of the same name.
 
     The clock starts at 0 again, so the paths of rigid bodies are moved back in time.
     """
@@ -85,11 +85,13 @@ def transferred(
         for body in model.bodies
     ]
     after = make(remade(model, bodies))
-    states = zip(model.bodies, before.positions, before.velocities, strict=False)
-    for index, (body, positions, velocities) in enumerate(states):
+    names = [body.name for body in before.model.bodies]
+    states = dict(zip(names, zip(before.positions, before.velocities, strict=True), strict=True))
+    for body in model.bodies:
         if body.rigid is None:
-            after.set_positions(index, positions)
-            after.set_velocities(index, velocities)
+            positions, velocities = states[body.name]
+            after.set_positions(body.name, positions)
+            after.set_velocities(body.name, velocities)
     return after
 
 

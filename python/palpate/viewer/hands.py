@@ -35,11 +35,6 @@ class Hands:
         self._placed = (np.eye(3), np.zeros(3))
         self._radius = 0.0
         self._owner: int | None = None
-        self.attach(simulation)
-
-    def attach(self, simulation: Simulation) -> None:
-        """Work on another simulation; grips of the last one must have been let go."""
-        self._simulation = simulation
         soft = [
             points
             for body, points in zip(simulation.model.bodies, simulation.positions, strict=True)
@@ -47,6 +42,11 @@ class Hands:
         ]
         cloud = np.concatenate(soft or list(simulation.positions))
         self._scale = float(np.linalg.norm(np.ptp(cloud, axis=0))) or 1.0
+        self.attach(simulation)
+
+    def attach(self, simulation: Simulation) -> None:
+        """Work on another simulation; grips of the last one must have been let go."""
+        self._simulation = simulation
         self._tool: Any = None
         if self.has_tool:
             self._tool = simulation.tool(NAME)
@@ -127,6 +127,10 @@ class Hands:
             grip.release()
         self._grips.clear()
 
+    def forget_released(self) -> None:
+        """Drop grips whose node a cut has taken away."""
+        self._grips = {key: grip for key, grip in self._grips.items() if grip.holds}
+
     def shown(self) -> dict[str, Any]:
         """Pulls and probe for the header of a frame."""
         tool = None
@@ -177,6 +181,10 @@ class _Grip:
         along = self._target - at
         length = float(np.linalg.norm(along))
         self._pull.target = at + along * min(1.0, self._reach / max(length, 1e-12))
+
+    @property
+    def holds(self) -> bool:
+        return self._pull.is_active
 
     def release(self) -> None:
         self._pull.release()

@@ -12,10 +12,11 @@ import numpy.typing as npt
 
 from palpate._arrays import Float64Array
 from palpate.contacts import DetectionStats
+from palpate.cutting import Blade
 from palpate.model import Body, Model
 from palpate.results.drawing import looks_of, upward
 from palpate.results.frames import contact_depths
-from palpate.simulation import Simulation, StepReport
+from palpate.simulation import Simulation, Snapshot, StepReport
 from palpate.viewer.editing import edited, settings_of, transferred
 from palpate.viewer.hands import Hands
 from palpate.viewer.player import Outcome, Player, Wishes
@@ -47,7 +48,7 @@ class LivePlayer(Player):
         self._report: StepReport | None = None
         self._stats: DetectionStats | None = None
         self._counted = 0.0
-        self._undo: list[Any] = []
+        self._undo: list[Snapshot] = []
         self._strain: list[Strain] = []
         self._strain_version = -1
         self._hands = Hands(simulation)
@@ -70,9 +71,7 @@ class LivePlayer(Player):
         return False
 
     def hello(self) -> dict[str, Any]:
-        features = ["settings", "reset", "pull", "tool"]
-        if hasattr(self._simulation, "cut"):
-            features.append("cut")
+        features = ["settings", "reset", "pull", "tool", "cut"]
         return {"features": features, "fields": _FIELDS}
 
     def scene(self) -> bytes:
@@ -145,6 +144,8 @@ class LivePlayer(Player):
             return self._handle(command, client)
         if kind == "cut":
             return self._cut(command["edges"])
+        if kind == "separate":
+            return self._separate()
         if kind == "undo":
             return self._undo_cut()
         if kind == "reset":
@@ -159,27 +160,49 @@ class LivePlayer(Player):
     def _handle(self, command: Command, client: int) -> Outcome:
         if command["type"] == "tool" and not self._hands.has_tool:
             self._hands.take_probe(command)
-            self._remake(self._simulation.model, self._simulation.time_step)
+            notice = self._remake(self._simulation.model, self._simulation.time_step)
             self._hands.obey(command, client, self._surfaces)
-            return Outcome(scene=True, frame=True, state=True)
+            return Outcome(scene=True, frame=True, state=True, notice=notice)
         self._hands.obey(command, client, self._surfaces)
         return Outcome(frame=True)
 
     def _cut(self, edges: list[Any]) -> Outcome:
-        import palpate
-
         before = self._simulation.snapshot()
-        blade = palpate.Blade.stroke(np.asarray(edges, dtype=np.float64))  # type: ignore[attr-defined]
-        report = self._simulation.cut(blade)  # type: ignore[attr-defined]
+        cut = self._simulation.cut(Blade.stroke(edges))
+        if not cut.bodies:
+            return Outcome(notice="the stroke met no tissue")
+        self._changed_by_hand(before)
+        bodies = self._simulation.model.bodies
+        done = [
+            f"{bodies[each.body].name}: {each.cut_area * 1e4:.3g} cm² cut"
+            + (f", {each.pieces} pieces" if each.pieces > 1 else "")
+            for each in cut.bodies
+        ]
+        text = f"{'; '.join(done)} (in {1e3 * cut.times['total']:.0f} ms)"
+        return Outcome(scene=True, frame=True, state=True, notice=text)
+
+    def _separate(self) -> Outcome:
+        """Pieces that came apart become bodies."""
+        before, count = self._simulation.snapshot(), len(self._simulation.model.bodies)
+        self._hands.let_go()
+        if not self._simulation.separate():
+            return Outcome(notice="nothing has come apart")
+        self._changed_by_hand(before)
+        self._hands.attach(self._simulation)
+        more = len(self._simulation.model.bodies) - count
+        return Outcome(scene=True, frame=True, state=True, notice=f"{more} more bodies")
+
+    def _changed_by_hand(self, before: Snapshot) -> None:
         self._undo = [*self._undo[1 - _UNDO :], before]
+        self._hands.forget_released()
         self._new_topology()
-        return Outcome(scene=True, frame=True, state=True, notice=str(report))
 
     def _undo_cut(self) -> Outcome:
         if not self._undo:
             return Outcome(notice="there is no cut to undo")
         self._hands.let_go()
         self._simulation.restore(self._undo.pop())
+        self._hands.attach(self._simulation)
         self._new_topology()
         return Outcome(scene=True, frame=True, state=True)
 
@@ -201,14 +224,12 @@ class LivePlayer(Player):
         """Settings are part of the model: a new simulation takes over the state."""
         time_step = command["time_step"] or self._simulation.time_step
         model = edited(self._simulation.model, command)
-        self._remake(model, time_step)
+        notice = self._remake(model, time_step)
         self._start = edited(self._start, command)
-        dropped = bool(self._undo)
-        self._undo.clear()
-        notice = "cuts made before a change of settings cannot be undone" if dropped else None
         return Outcome(scene=True, frame=True, state=True, notice=notice)
 
-    def _remake(self, model: Model, time_step: float) -> None:
+    def _remake(self, model: Model, time_step: float) -> str | None:
+        """Go on with another simulation in the same state; what the user should know of it."""
         before = self._simulation
         self._hands.let_go()
         model = self._hands.with_probe(model)
@@ -216,6 +237,9 @@ class LivePlayer(Player):
         self._passed += before.time
         self._remade = True
         self._replace(after)
+        dropped = bool(self._undo)
+        self._undo.clear()
+        return "what was cut before this cannot be undone any more" if dropped else None
 
     def _simulation_of(self, model: Model, time_step: float) -> Simulation:
         return Simulation(model, time_step=time_step, **self._simulation._options)
@@ -257,7 +281,7 @@ class LivePlayer(Player):
         if self._report is not None:
             report = self._report
             numbers = {
-                "times": report.times,
+                "times": {**report.stages, "total": report.times["total"]},
                 "contacts": report.contacts,
                 "self_contacts": report.self_contacts,
                 "penetrating_nodes": report.penetrating_nodes,

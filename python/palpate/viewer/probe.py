@@ -9,7 +9,7 @@ from palpate._arrays import Float64Array
 from palpate.mesh import Mesh
 
 #: Name of the body that the viewer adds to a model.
-NAME = "probe"
+NAME = "viewer probe"
 
 _AROUND = 24
 _RINGS = 7

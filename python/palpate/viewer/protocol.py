@@ -230,6 +230,7 @@ _COMMANDS: dict[str, dict[str, Callable[[Any], Any]]] = {
     "reset": {},
     "reload": {},
     "undo": {},
+    "separate": {},
     "speed": {"value": _optional(_number(1e-3, 1e3))},  # null: as fast as it goes
     "seek": {"frame": _whole(0, 2**31)},
     "show": {

@@ -11,7 +11,7 @@ import { Recording } from "palpate/recording";
 import { Stage } from "palpate/stage";
 
 /** Name of the body that pushes, see `probe.py`. */
-const PROBE = "probe";
+const PROBE = "viewer probe";
 
 const find = (name) => document.getElementById(name);
 
@@ -88,7 +88,9 @@ class App {
     this.version = header.version;
     find("problem").hidden = true;
     const names = header.bodies.map((body) => body.name).join("/");
-    this.stage.setScene(message, this.haveScene && names.startsWith(this.names ?? "/"));
+    // Pieces of a cut come and go at the end; anything else is another scene.
+    const same = this.haveScene && (names.startsWith(this.names) || this.names.startsWith(names));
+    this.stage.setScene(message, same);
     this.names = names;
     this.unframed ||= !this.haveScene;
     this.haveScene = true;

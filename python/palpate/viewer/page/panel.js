@@ -111,6 +111,9 @@ export class Panel {
       row("Probe", range("probe", -0.7, 0.7, (x) => 10 ** x, Math.log10, (x) => `${digits(x, 2)}×`), "tool"),
       row("Cut depth", make("div", { class: "field" }, depth, make("span", { class: "unit" }, "mm")), "cut"),
     ];
+    const apart = make("button", { class: "plain", onclick: () => this.app.send({ type: "separate" }) }, "Pieces become bodies");
+    apart.title = "What has come apart is then moved, shown and set on its own";
+    this.handRows.push(row("After cuts", apart, "cut"));
     this.hands.body.append(
       ...this.handRows,
       make("p", { class: "hint" }, "Alt or the right button always moves the camera; while pulling or pushing, the wheel moves the hand in depth."),
@@ -151,7 +154,7 @@ export class Panel {
           this.open[more.hidden ? "delete" : "add"](body.look.name);
           this.fill(index);
         };
-        const hidden = app.can("tool") && body.look.name === "probe";
+        const hidden = app.can("tool") && body.look.name === "viewer probe";
         const row = make("div", { class: "body", hidden }, make("div", { class: "top" }, swatch, who, make("span", { class: "what" }, what), eye), more);
         row.more = more;
         return row;

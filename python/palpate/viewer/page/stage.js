@@ -89,6 +89,7 @@ export class Stage {
     this.nodeCount = start;
     this.triangleCount = firstTriangle;
     if (!keepCamera) this.place(header);
+    this.world.updateMatrixWorld(true); // picking may come before the next picture
     this.touch();
   }
 
