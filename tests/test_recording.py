@@ -218,3 +218,22 @@ def test_render_refuses(tmp_path, monkeypatch, arguments, status, text):
     monkeypatch.chdir(tmp_path)
     assert text in run("render", *arguments, status=status)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_cuts_are_played(tmp_path):
+    (tmp_path / "cut.blade").write_text("blade 1\nplane at 0.05 s\n  0 0 0.03  1 0 0\n")
+    folder = tmp_path / "out"
+    arguments = ["--duration", 0.1, "--every", 3, "--no-pictures", "--output", folder]
+    run("simulate", "small", *arguments, "--cut", tmp_path / "cut.blade")
+    viewer = NullViewer(lambda: RecordedPlayer(Recording(folder)))
+    whole = viewer.arrays("scene")
+    viewer.send({"type": "seek", "frame": 2})
+    cut = viewer.arrays("scene")
+    assert len(cut["triangles/0"]) > len(whole["triangles/0"])
+    assert np.array_equal(cut["triangles/3"], whole["triangles/3"])
+    assert viewer.header("frame")["version"] == viewer.header("scene")["version"]
+    viewer.send({"type": "seek", "frame": 0})
+    assert np.array_equal(viewer.arrays("scene")["triangles/0"], whole["triangles/0"])
+    run("view", folder, "--export", tmp_path / "film.html")
+    kinds = [header["type"] for header, _ in messages_of((tmp_path / "film.html").read_text())]
+    assert kinds == ["hello", "scene", "scene", "frame", "frame", "frame"]
