@@ -1,20 +1,29 @@
-"""`palpate bench paper | scaling | peers | realtime`: measurements with plots and a report."""
+"""`palpate bench paper | scaling | peers | realtime | cutting`: measurements and a report."""
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 from rich.text import Text
 
-from palpate.bench import compare, paper, plots, realtime, scaling
+from palpate.bench import compare, cutting, paper, plots, realtime, scaling
 from palpate.bench.output import milliseconds
 from palpate.cli.opening import open_model
-from palpate.cli.output import JsonOption, console, print_json, reporting, table, whole
+from palpate.cli.output import (
+    JsonOption,
+    ThreadsOption,
+    console,
+    print_json,
+    reporting,
+    table,
+    whole,
+)
 from palpate.model import Model
 
 ModelsArgument = Annotated[
@@ -337,6 +346,38 @@ def bench_realtime(
     _tell(output)
 
 
+def bench_cutting(
+    model: Annotated[str, typer.Argument(metavar="MODEL", help="What is cut.")] = "case2",
+    body: Annotated[str, typer.Option(help="The body that the cut goes through.")] = "kidney_left",
+    frames: Annotated[int, typer.Option(min=2, help="Frames of the cut.")] = 120,
+    threads: ThreadsOption = 1,
+    output: Annotated[Path, _output_option("cutting")] = Path("out/bench/cutting"),
+    json_output: JsonOption = False,
+) -> None:
+    """Cut through a resting organ in small steps: median, 99th percentile, worst, by stage.
+
+    Writes results.json, cutting.csv and report.md.
+
+    Example: palpate bench cutting --threads 2
+    """
+    opened = open_model(model)[0]
+    with progress(cutting.SETTLE + frames, quiet=json_output) as advance:
+        outcome = cutting.run(
+            opened,
+            Path(model).stem,
+            body,
+            frames=frames,
+            threads=threads,
+            output=output,
+            advance=advance,
+        )
+    if json_output:
+        print_json({"output": str(output), **asdict(outcome)})
+        return
+    console().print(table("Frames of 1/60 s", cutting.HEADINGS, cutting.rows(outcome)))
+    _tell(output)
+
+
 def _prepare(models: list[str] | None, *, draw: bool) -> list[tuple[str, Model]]:
     """Open the models, and find out what is missing before anything is measured."""
     if draw:
@@ -367,5 +408,6 @@ for _name, _command in (
     ("scaling", bench_scaling),
     ("peers", bench_peers),
     ("realtime", bench_realtime),
+    ("cutting", bench_cutting),
 ):
     bench_app.command(_name)(reporting(_command))

@@ -3,10 +3,11 @@
 use std::sync::Arc;
 
 use palpate_contact::{IntersectionOptions, Method, Scene, SceneError, SceneOptions};
+use palpate_cutting::{Blade, CutOptions, cut};
 use palpate_model::{Mesh, MeshChange};
 
 use crate::intersections::{scene, validate};
-use crate::scenes::{Positions, Random, as_slices, block, horseshoe, jittered, positions};
+use crate::scenes::{Point, Positions, Random, as_slices, block, horseshoe, jittered, positions};
 
 const COMPLETE: IntersectionOptions =
     IntersectionOptions { self_contact: true, same_leaf: true, shared_nodes: false };
@@ -71,6 +72,69 @@ fn some_tetrahedra(mesh: &Mesh, random: &mut Random) -> Vec<u32> {
     chosen.sort_unstable();
     chosen.dedup();
     chosen
+}
+
+/// A blade through a random place: a square, or a bent stroke.
+fn some_blade(positions: &[Point], random: &mut Random) -> Blade {
+    let count = positions.len() as u64;
+    let at = positions[(random.bits() % count) as usize];
+    let size = random.between(0.5, 4.0);
+    if random.between(0.0, 1.0) < 0.5 {
+        return Blade::plane(at, random.vector(1.0), Some(size)).expect("a normal of some length");
+    }
+    let (along, down) = (random.vector(0.4 * size), random.vector(size));
+    let bend = random.vector(0.1 * size);
+    let edges: Vec<[Point; 2]> = (-2..=2)
+        .map(|step| {
+            let s = f64::from(step);
+            let heel = std::array::from_fn(|k| at[k] + s * along[k] + s * s * bend[k] - down[k]);
+            [heel, std::array::from_fn(|k| heel[k] + 2.0 * down[k])]
+        })
+        .collect();
+    Blade::stroke(&edges).expect("edges that move")
+}
+
+/// Cuts and removes, moves, compares; begins again with fresh bodies when they are in small pieces.
+fn cuts(changes: usize, seed: u64) {
+    let mut random = Random(seed);
+    let mut twins = Twins::new(&bodies(&mut random));
+    let (mut sums, mut made) = ([0; 3], 0);
+    for number in 0..changes {
+        let body = (random.bits() % 2) as usize;
+        let scene = &twins.0[0];
+        let mesh = Arc::clone(scene.mesh(body));
+        if mesh.tetrahedra().len() > 500 {
+            twins = Twins::new(&bodies(&mut random));
+            continue;
+        }
+        let blade = some_blade(scene.positions(body), &mut random);
+        let options = CutOptions { min_edge: 0.05, ..CutOptions::default() };
+        let found = cut(&mesh, scene.positions(body), &blade, &options).expect("a mesh to cut");
+        if let Some(found) = found {
+            twins.change(body, &found.change);
+            made += 1;
+        }
+        // Lips that coincide are the hardest; then they move.
+        if number % 2 == 0 {
+            let mut moved: Positions = (0..2).map(|b| twins.0[0].positions(b).to_vec()).collect();
+            for point in moved.iter_mut().flatten() {
+                let noise = random.vector(0.02);
+                *point = std::array::from_fn(|axis| point[axis] + noise[axis]);
+            }
+            twins.update(&moved);
+        }
+        let found = twins.compare(random.between(0.01, 0.05), &format!("cut {number}"));
+        sums = std::array::from_fn(|i| sums[i] + found[i]);
+    }
+    assert!(made > changes / 2, "{made}");
+    assert!(sums.iter().all(|&sum| sum > 2 * changes), "{sums:?}");
+}
+
+#[test]
+fn after_every_cut_the_pairs_are_those_of_the_double_loop() {
+    // Ten thousand with PALPATE_CHANGES=10000.
+    let changes = std::env::var("PALPATE_CHANGES").map(|text| text.parse().expect("a number"));
+    cuts(changes.unwrap_or(16), 21);
 }
 
 /// Removes, moves, compares; begins again with fresh bodies when little is left.

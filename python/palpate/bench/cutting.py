@@ -1,0 +1,149 @@
+"""A long cut through a kidney of case 2 at rest: how long each frame takes, and where it goes.
+
+A scalpel moves on by a little before every frame; a frame is the cut and the step of 1/60 s. The
+frames before the cut are the usual ones.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from palpate._arrays import Float64Array
+from palpate.bench.output import markdown_table, milliseconds, write_csv, write_json, write_text
+from palpate.cutting import Blade
+from palpate.model import Model
+from palpate.simulation import Simulation
+
+#: Frames until the bodies are at rest.
+SETTLE = 240
+
+#: How long the frames and their stages took, by row of the report.
+STAGES = ("cutting", "detection", "mechanics", "step", "frame")
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Seconds: median, 99th percentile and worst."""
+
+    median: float
+    p99: float
+    worst: float
+
+    @classmethod
+    def of(cls, seconds: list[float]) -> Spread:
+        """The spread of a list that is not empty."""
+        low, high, worst = np.percentile(seconds, [50, 99, 100]).tolist()
+        return cls(low, high, worst)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a cut of so many frames cost."""
+
+    model: str
+    body: str
+    threads: int
+    frames: int
+    #: Frames in which something came apart.
+    opened: int
+    tetrahedra: tuple[int, int]
+    usual: Spread
+    #: By stage; ``frame`` is all of it.
+    while_cutting: dict[str, Spread]
+
+
+def run(
+    model: Model,
+    name: str,
+    body: str,
+    *,
+    frames: int,
+    threads: int,
+    output: Path | None,
+    advance: Callable[[], None] = lambda: None,
+) -> Outcome:
+    """Measure, and write results.json, cutting.csv and report.md into ``output``."""
+    simulation = Simulation(model, threads=threads)
+    index = model.body_index(body)
+    usual: list[float] = []
+    for frame in range(SETTLE):
+        report = simulation.step()
+        if frame >= SETTLE - 60:
+            usual.append(report.times["total"])
+        advance()
+    before = len(simulation.model.bodies[index].mesh.tetrahedra)
+    edges = _edges(simulation.positions[index], frames)
+    seconds: dict[str, list[float]] = {stage: [] for stage in STAGES}
+    opened = 0
+    for frame in range(frames):
+        cut = simulation.cut(Blade.stroke(edges[frame : frame + 2]))
+        step = simulation.step().times["total"]
+        opened += len(cut) > 0
+        for stage in STAGES[:3]:
+            seconds[stage].append(cut.times[stage])
+        seconds["step"].append(step)
+        seconds["frame"].append(cut.times["total"] + step)
+        advance()
+    after = len(simulation.model.bodies[index].mesh.tetrahedra)
+    outcome = Outcome(
+        model=name,
+        body=body,
+        threads=threads,
+        frames=frames,
+        opened=opened,
+        tetrahedra=(before, after),
+        usual=Spread.of(usual),
+        while_cutting={stage: Spread.of(values) for stage, values in seconds.items()},
+    )
+    if output is not None:
+        output.mkdir(parents=True, exist_ok=True)
+        options = {"model": name, "body": body, "frames": frames, "threads": threads}
+        write_json(output / "results.json", "cutting", options, **asdict(outcome), seconds=seconds)
+        lines: list[dict[str, Any]] = [
+            {stage: seconds[stage][frame] for stage in STAGES} for frame in range(frames)
+        ]
+        write_csv(output / "cutting.csv", lines)
+        write_text(output / "report.md", *_report(outcome))
+    return outcome
+
+
+def rows(outcome: Outcome) -> list[list[str]]:
+    """Stage, median, 99th percentile and worst in words."""
+    named = {"a usual step": outcome.usual, **outcome.while_cutting}
+    return [
+        [name, milliseconds(s.median), milliseconds(s.p99), milliseconds(s.worst)]
+        for name, s in named.items()
+    ]
+
+
+#: Of the rows.
+HEADINGS = "stage<|median ms|99 %|worst"
+
+
+def _report(outcome: Outcome) -> tuple[str, str, str]:
+    before, after = outcome.tetrahedra
+    return (
+        f"# A long cut through {outcome.body} of {outcome.model}",
+        f"{outcome.frames} frames of 1/60 s, {outcome.opened} of them open something; {before} "
+        f"tetrahedra become {after}; {outcome.threads} threads.",
+        markdown_table(HEADINGS, rows(outcome)),
+    )
+
+
+def _edges(points: Float64Array, frames: int) -> Float64Array:
+    """Places of the scalpel's edge: along the middle of the body, down to its middle."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    middle, size = (low + high) / 2, high - low
+    along = 0 if size[0] > size[1] else 1
+    s = np.linspace(-0.45, 0.45, frames + 1)
+    edges = np.tile(middle, (frames + 1, 2, 1))
+    edges[:, :, along] += (s * size[along])[:, None]
+    edges[:, :, 1 - along] += (0.06 * size[1 - along] * np.sin(5 * s))[:, None]
+    edges[:, 0, 2] = high[2] + 0.2 * size[2]
+    edges[:, 1, 2] = middle[2]
+    return edges
