@@ -221,6 +221,21 @@ impl MovingBody {
         }
     }
 
+    /// Improves the step of a body that contact forces act on; true if they must be solved for again.
+    pub(crate) fn improve(&mut self, surface: &[u32]) -> bool {
+        let BodyKind::Elastic(elastic) = &mut self.kind else { return false };
+        let touched = self.touched || !self.expected_nodes.is_empty();
+        if !touched || !elastic.improve(&self.positions, &self.forces, &self.contact_forces) {
+            return false;
+        }
+        self.expected_forces.copy_from_slice(&self.contact_forces);
+        let loaded = |&&node: &&u32| self.contact_forces[node as usize] != [0.0; 3];
+        self.expected_nodes.clear();
+        self.expected_nodes.extend(surface.iter().filter(loaded));
+        elastic.end_positions(&self.positions, &mut self.expected_positions);
+        true
+    }
+
     /// The first node whose next state is not finite.
     pub(crate) fn first_broken_node(&self) -> Option<usize> {
         first_not_finite(&self.next_positions).or_else(|| first_not_finite(&self.next_velocities))

@@ -29,8 +29,9 @@ const MARGIN_LIMIT: f64 = 3.0;
 /// the whole step, at 1.5 a quarter of that.
 const SELF_MARGIN_LIMIT: f64 = 1.5;
 
-/// Passes of a step: a contact that only the forces of others bring about is found by the next one.
-const MAX_PASSES: usize = 4;
+/// Passes of a step: a contact that only the forces of others bring about is found by the next one, and
+/// a body of a nonlinear law answers otherwise than its matrix says.
+const MAX_PASSES: usize = 8;
 
 /// How the bodies are stepped.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -337,14 +338,18 @@ impl Dynamics {
         );
         stats.times.filter = start.elapsed();
 
-        for _ in 0..MAX_PASSES {
+        for pass in 1..=MAX_PASSES {
             self.solve_contacts(response, &mut stats);
             let start = Instant::now();
             self.set_contact_forces(response.forces());
             self.for_each_body(|_, body| body.advance(time_step));
-            let missed = response.take_missed(self.body_count(), |body| self.body(body));
+            let missed = response.take_missed(|body| self.body(body));
+            let again = pass < MAX_PASSES && (self.improve() || missed);
+            if again {
+                response.begin_again(self.body_count(), |body| self.body(body));
+            }
             stats.times.advance += start.elapsed();
-            if !missed {
+            if !again {
                 break;
             }
         }
@@ -370,6 +375,19 @@ impl Dynamics {
         self.ties.finish(response.tie_forces());
         self.step += 1;
         Ok(stats)
+    }
+
+    /// One iteration of the bodies that contact forces act on; true if the forces must be solved for
+    /// again.
+    fn improve(&mut self) -> bool {
+        let surfaces = std::mem::take(&mut self.surfaces);
+        let changed = AtomicUsize::new(0);
+        self.for_each_body(|index, body| {
+            let again = body.improve(surfaces[index].mesh().surface_nodes());
+            changed.fetch_add(usize::from(again), Ordering::Relaxed);
+        });
+        self.surfaces = surfaces;
+        changed.into_inner() > 0
     }
 
     fn add_ties(&self, candidates: &mut Vec<Candidate>) {

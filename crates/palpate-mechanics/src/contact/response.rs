@@ -84,11 +84,7 @@ impl Response {
 
     /// Takes in the pairs that the step brought together although it was not expected; true if
     /// there are any, so that the forces must be solved again.
-    pub(crate) fn take_missed<'a>(
-        &mut self,
-        body_count: usize,
-        body: impl Fn(usize) -> &'a MovingBody,
-    ) -> bool {
+    pub(crate) fn take_missed<'a>(&mut self, body: impl Fn(usize) -> &'a MovingBody) -> bool {
         let known = self.candidates.len();
         let candidates = &mut self.candidates;
         self.spare.retain(|candidate| {
@@ -99,13 +95,18 @@ impl Response {
             }
             !missed
         });
-        if self.candidates.len() == known {
-            return false;
-        }
+        self.candidates.len() > known
+    }
+
+    /// Prepares another solve, that begins with the forces of the last one.
+    pub(crate) fn begin_again<'a>(
+        &mut self,
+        body_count: usize,
+        body: impl Fn(usize) -> &'a MovingBody,
+    ) {
         self.guess.restore(&self.forces);
         self.problem.collect(&self.candidates, body_count, &body);
         self.contacts.clear();
-        true
     }
 
     /// Possible contacts.

@@ -23,7 +23,14 @@ const MEMORY: usize = 5;
 const TOLERANCE: f64 = 3e-4;
 /// Most iterations of a step.
 const MAX_ITERATIONS: usize = 10;
-/// Iterations of a step after which A is made anew.
+/// Most iterations while contact forces are held: what touches gives way otherwise than forces do.
+const MAX_HELD_ITERATIONS: usize = 2;
+/// While contact forces are held a move must be this much shorter than the one before: a compressed
+/// body that is held by forces instead of by what it touches is unstable, and would run away.
+const SHRINKING: f64 = 0.5;
+/// Moves smaller than this, in mean edges, are not worth another solve for the contact forces.
+const SETTLED: f64 = 0.1;
+/// Iterations of a step, or solves for its contact forces, after which A is made anew.
 const SLOW: u32 = 6;
 /// The same when a node has moved by more than this part of the body's radius since, apart from the
 /// body's motion as a whole: slow processes need few iterations in each of very many steps.
@@ -52,6 +59,12 @@ pub(super) struct QuasiNewton {
     stiff_arms: Vec<DVec3>,
     /// Iterations of the last step.
     iterations: u32,
+    /// Solves for the contact forces in the last step, and the larger of that and the iterations of
+    /// any of them.
+    passes: u32,
+    effort: u32,
+    /// Longest move of the last iteration [m].
+    longest: f64,
 }
 
 /// A move s of the free nodes and the change y of the residual, its sign turned.
@@ -86,6 +99,9 @@ impl QuasiNewton {
             stiff_shape: Vec::with_capacity(node_count),
             stiff_arms: Vec::with_capacity(node_count),
             iterations: 0,
+            passes: 0,
+            effort: 0,
+            longest: 0.0,
         }
     }
 
@@ -158,7 +174,7 @@ impl ElasticBody {
     pub(in crate::body) fn refresh_if_slow(&mut self, x: &[Point]) -> bool {
         match std::mem::take(&mut self.elasticity) {
             Elasticity::Nonlinear(mut method) => {
-                let due = method.iterations >= SLOW || self.is_deformed(&method, x);
+                let due = method.effort >= SLOW || self.is_deformed(&method, x);
                 let changed = due && self.take_stiffness(&mut method, x);
                 self.elasticity = Elasticity::Nonlinear(method);
                 changed
@@ -208,9 +224,21 @@ impl ElasticBody {
     ) {
         method.tissue.begin_step(x, self.time_step);
         self.step.correction.fill([0.0; 3]);
+        method.iterations = 0;
+        (method.effort, method.passes) = (0, 1);
+        self.relax(method, forces, contact);
+        if self.is_unattached() {
+            self.put_momentum_right(x, forces, contact);
+        }
+    }
+
+    /// Iterates from the present correction, with care while contact forces are held.
+    fn relax(&mut self, method: &mut QuasiNewton, forces: &[Point], contact: Option<&[Point]>) {
+        let held = contact.is_some();
+        let most = if held { MAX_HELD_ITERATIONS } else { MAX_ITERATIONS };
         let mut known = 0;
-        for iteration in 0..MAX_ITERATIONS {
-            method.iterations = iteration as u32 + 1;
+        let mut last = f64::INFINITY;
+        for iteration in 0..most {
             std::mem::swap(&mut method.scratch, &mut method.residual);
             self.find_residual(method, forces, contact);
             if iteration > 0 {
@@ -228,23 +256,62 @@ impl ElasticBody {
                         pairs.rotate_left(1);
                         known -= 1;
                     }
+                } else if held {
+                    break;
                 }
             }
             let longest = self.next_move(method, known);
-            let s = &mut method.pairs[known].s;
-            let limit = LONGEST_MOVE * method.mean_edge;
-            let scale = if longest > limit { limit / longest } else { 1.0 };
-            for ((d, s), z) in self.step.correction.iter_mut().zip(s).zip(&method.scratch) {
-                *s = z.map(|z| scale * z);
-                *d = std::array::from_fn(|k| d[k] + s[k]);
+            if held && longest > SHRINKING * last {
+                break;
             }
+            method.iterations += 1;
+            method.effort = method.effort.max(iteration as u32 + 1);
+            method.longest = longest;
+            last = longest;
+            self.make_move(method, known, longest);
             if longest <= TOLERANCE * method.mean_edge {
                 break;
             }
         }
-        if self.is_unattached() {
-            self.put_momentum_right(x, forces, contact);
+    }
+
+    /// Adds the next move, shortened where it is too long.
+    fn make_move(&mut self, method: &mut QuasiNewton, known: usize, longest: f64) {
+        let s = &mut method.pairs[known].s;
+        let limit = LONGEST_MOVE * method.mean_edge;
+        let scale = if longest > limit { limit / longest } else { 1.0 };
+        for ((d, s), z) in self.step.correction.iter_mut().zip(s).zip(&method.scratch) {
+            *s = z.map(|z| scale * z);
+            *d = std::array::from_fn(|k| d[k] + s[k]);
         }
+    }
+
+    /// Some more iterations, now that the response to other contact forces is known: false if there is
+    /// nothing to gain. The contact forces are expected from now on, and the response is zero.
+    pub(super) fn iterate(
+        &mut self,
+        method: &mut QuasiNewton,
+        x: &[Point],
+        forces: &[Point],
+        contact: &[Point],
+    ) -> bool {
+        let enough = SETTLED * method.mean_edge;
+        let squares = self.step.response.iter().map(|r| DVec3::from_array(*r).length_squared());
+        let response = squares.fold(0.0, f64::max).sqrt();
+        if method.longest.max(response) <= enough {
+            return false;
+        }
+        for (d, r) in self.step.correction.iter_mut().zip(&mut self.step.response) {
+            *d = std::array::from_fn(|k| d[k] + r[k]);
+            *r = [0.0; 3];
+        }
+        method.passes += 1;
+        method.effort = method.effort.max(method.passes);
+        self.relax(method, forces, Some(contact));
+        if self.is_unattached() {
+            self.put_momentum_right(x, forces, Some(contact));
+        }
+        true
     }
 
     /// Moves and turns the body as a whole so that only external and contact forces have changed its

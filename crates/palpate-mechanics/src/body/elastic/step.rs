@@ -31,7 +31,7 @@ pub(super) struct Step {
     /// Response of the free nodes in the frame to the contact forces that are expected [m].
     expected: Vec<[f64; 3]>,
     /// Response to the change of contact forces [m].
-    response: Vec<[f64; 3]>,
+    pub(super) response: Vec<[f64; 3]>,
     /// Rotations of the predicted positions of an unattached body.
     rotations: Rotations,
     /// Whether loads turn the body by these rotations alone.
@@ -267,6 +267,23 @@ impl ElasticBody {
         self.load(&mut response, change);
         self.respond_to(&mut response);
         self.step.response = response;
+    }
+
+    /// Improves the step under contact forces that are not those that it was predicted with; true if
+    /// it has changed, so that contact must be solved again from the new [`Self::end_positions`].
+    pub(in crate::body) fn improve(
+        &mut self,
+        x: &[Point],
+        forces: &[Point],
+        contact: &[Point],
+    ) -> bool {
+        let mut elasticity = std::mem::take(&mut self.elasticity);
+        let changed = match &mut elasticity {
+            Elasticity::Nonlinear(method) => self.iterate(method, x, forces, contact),
+            _ => false,
+        };
+        self.elasticity = elasticity;
+        changed
     }
 
     /// Turns loads on the free nodes, in the frame, into displacements; torques turn an unattached body
