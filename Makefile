@@ -9,7 +9,7 @@ SOURCES := pyproject.toml Cargo.toml Cargo.lock $(shell find crates -name '*.rs'
 CRATES := --workspace --exclude palpate-python
 
 .DEFAULT_GOAL := help
-.PHONY: help install run view test test-rust test-python soak lint format bench docs wheel models three clean
+.PHONY: help install run view test test-rust test-python soak soak-mechanics lint format bench docs wheel models three clean
 
 help: ## Show this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /\1\t/' | expand -t 14
@@ -41,6 +41,9 @@ test-python: install
 soak: ## Compare with the double loop on fresh random scenes for MINUTES (10)
 	PALPATE_SOAK=$(or $(MINUTES),10) cargo test --release --locked -p palpate-contact \
 		--test soak --test wide -- --nocapture
+
+soak-mechanics: install ## Pull at the organs of case 2 at random for MINUTES (10)
+	$(BIN)/python -m palpate.bench.verification.soak $(or $(MINUTES),10) $(SEED)
 
 bench: ## Time each stage of detection; count its instructions with valgrind
 	cargo bench --locked -p palpate-contact --bench stages

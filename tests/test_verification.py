@@ -112,3 +112,24 @@ def test_walls_give_no_energy(law):
     drift = motion.prison(law, 600)
     assert drift.largest_gain < 1e-7
     assert drift.energy[-1] < 0.01
+
+
+@pytest.mark.parametrize(("lower", "upper"), [(3, 4), (5, 8)])
+def test_uniform_pressure_passes_through_meshes_that_do_not_match(lower, upper):
+    result = touching.contact_patch(lower, upper)
+    assert result.typical_error < 0.03
+    # What the contact gets wrong stays within a cell of it.
+    cell = 0.1 / min(lower, upper)
+    far = np.abs(result.heights - 0.1) > 1.5 * cell
+    assert np.abs(result.stress[far] / -result.pressure - 1.0).max() < 0.03
+
+
+@pytest.mark.parametrize("law", ["linear", "corotated", "neo-hookean"])
+def test_a_squeezed_organ_comes_back(law):
+    material = palpate.Material(law=law, young=8e3, density=1050.0, damping=0.02)
+    result = organs.squeeze(organs.kidney(), material, 0.75, rest=0.3)
+    assert result.gaps.min() == pytest.approx(0.75)
+    assert result.misfits.max() > 0.03
+    assert result.inverted.max() == 0
+    assert result.misfits[-1] < 0.005
+    assert result.intersections == 0

@@ -1,4 +1,8 @@
+<<<<<<< HEAD
 """`palpate bench paper | scaling | peers | realtime | cutting`: measurements and a report."""
+=======
+"""`palpate bench paper | scaling | peers | realtime | verification`: measured and reported."""
+>>>>>>> 67c69a1 (Add palpate bench verification, a soak of mechanics, and an example per capability)
 
 from __future__ import annotations
 
@@ -14,6 +18,7 @@ from rich.text import Text
 
 from palpate.bench import compare, cutting, paper, plots, realtime, scaling
 from palpate.bench.output import milliseconds
+from palpate.bench.verification import run as verification
 from palpate.cli.opening import open_model
 from palpate.cli.output import (
     JsonOption,
@@ -42,7 +47,7 @@ _DEFAULT_MODELS = ("paper1", "paper2")
 
 bench_app = typer.Typer(
     name="bench",
-    help="Measure: the paper's evaluation, growth with size, other libraries.",
+    help="Measure: the paper's evaluation, growth with size, other libraries, exact solutions.",
     no_args_is_help=True,
 )
 
@@ -346,6 +351,7 @@ def bench_realtime(
     _tell(output)
 
 
+<<<<<<< HEAD
 def bench_cutting(
     model: Annotated[str, typer.Argument(metavar="MODEL", help="What is cut.")] = "case2",
     body: Annotated[str, typer.Option(help="The body that the cut goes through.")] = "kidney_left",
@@ -375,6 +381,37 @@ def bench_cutting(
         print_json({"output": str(output), **asdict(outcome)})
         return
     console().print(table("Frames of 1/60 s", cutting.HEADINGS, cutting.rows(outcome)))
+=======
+def bench_verification(
+    output: Annotated[Path, _output_option("verification")] = Path("out/bench/verification"),
+    draw: PlotsOption = True,
+    json_output: JsonOption = False,
+) -> None:
+    """Check the mechanics against exact solutions: elasticity, contact, motion.
+
+    Takes some minutes. With PALPATE_DATA set to a folder with organs/*.vtk real organs are dropped
+    in a heap as well. Writes results.json, report.md and plots.
+
+    Example: palpate bench verification
+    """
+    if draw:
+        plots.require()
+    with progress(verification.PARTS, quiet=json_output) as advance:
+        findings = verification.run(output, drawn=draw, advance=advance)
+    if json_output:
+        print_json({"output": str(output), "findings": [asdict(each) for each in findings]})
+        return
+    console().print(
+        table(
+            "The mechanics beside exact solutions",
+            "check<|target<|measured<|holds<",
+            [
+                (each.check, each.target, each.measured, "yes" if each.holds else "NO")
+                for each in findings
+            ],
+        )
+    )
+>>>>>>> 67c69a1 (Add palpate bench verification, a soak of mechanics, and an example per capability)
     _tell(output)
 
 
@@ -408,6 +445,10 @@ for _name, _command in (
     ("scaling", bench_scaling),
     ("peers", bench_peers),
     ("realtime", bench_realtime),
+<<<<<<< HEAD
     ("cutting", bench_cutting),
+=======
+    ("verification", bench_verification),
+>>>>>>> 67c69a1 (Add palpate bench verification, a soak of mechanics, and an example per capability)
 ):
     bench_app.command(_name)(reporting(_command))

@@ -55,7 +55,9 @@ class Squeeze:
     speed: float
 
 
-def squeeze(mesh: Mesh, material: Material, flat: float, *, rest: float = 2.0) -> Squeeze:
+def squeeze(
+    mesh: Mesh, material: Material, flat: float, *, rest: float = 2.0, time_step: float = 1 / 60
+) -> Squeeze:
     """Press to the part ``flat`` of the thickness within a second, hold, let go, wait ``rest``."""
     nodes = mesh.nodes - (mesh.nodes.min(axis=0) + mesh.nodes.max(axis=0)) / 2
     # The thinnest direction up.
@@ -84,7 +86,7 @@ def squeeze(mesh: Mesh, material: Material, flat: float, *, rest: float = 2.0) -
         Body(plate(half, low - clear), name="below", rigid=keys(1.0), contact=contact),
         Body(plate(half, high + clear, down=True), name="above", rigid=keys(-1.0), contact=contact),
     ]
-    simulation = Simulation(Model(bodies, gravity=(0, 0, 0)))
+    simulation = Simulation(Model(bodies, gravity=(0, 0, 0)), time_step=time_step)
     rows = []
     for _ in range(round((1.5 + rest) / simulation.time_step)):
         simulation.step()
@@ -126,16 +128,20 @@ class Heap:
 
 
 def heap(
-    meshes: Sequence[Mesh], material: Material, *, height: float = 0.05, duration: float = 2.0
+    meshes: Sequence[Mesh],
+    materials: Sequence[Material],
+    *,
+    height: float = 0.05,
+    duration: float = 2.0,
 ) -> Heap:
-    """Organs as they lie in their files, the lowest node ``height`` [m] above a rigid floor."""
+    """Organs as they lie to each other, the lowest node ``height`` [m] above a rigid floor."""
     stacked = np.concatenate([mesh.nodes for mesh in meshes])
     shift = -np.append((stacked.min(axis=0) + stacked.max(axis=0))[:2] / 2, stacked[:, 2].min())
     placed = [Mesh(mesh.nodes + shift + [0, 0, height], mesh.tetrahedra) for mesh in meshes]
     contact = Contact(friction=0.3)
     bodies = [
         Body(mesh, name=f"organ {index}", material=material, contact=contact)
-        for index, mesh in enumerate(placed)
+        for index, (mesh, material) in enumerate(zip(placed, materials, strict=True))
     ]
     bodies.append(Body(plate(1.0, 0.0), name="floor", rigid=(), contact=contact))
     simulation = Simulation(Model(bodies))
