@@ -1,8 +1,4 @@
-<<<<<<< HEAD
-"""`palpate bench paper | scaling | peers | realtime | cutting`: measurements and a report."""
-=======
-"""`palpate bench paper | scaling | peers | realtime | verification`: measured and reported."""
->>>>>>> 67c69a1 (Add palpate bench verification, a soak of mechanics, and an example per capability)
+"""`palpate bench paper | scaling | peers | realtime | cutting | verification`."""
 
 from __future__ import annotations
 
@@ -351,7 +347,6 @@ def bench_realtime(
     _tell(output)
 
 
-<<<<<<< HEAD
 def bench_cutting(
     model: Annotated[str, typer.Argument(metavar="MODEL", help="What is cut.")] = "case2",
     body: Annotated[str, typer.Option(help="The body that the cut goes through.")] = "kidney_left",
@@ -381,7 +376,9 @@ def bench_cutting(
         print_json({"output": str(output), **asdict(outcome)})
         return
     console().print(table("Frames of 1/60 s", cutting.HEADINGS, cutting.rows(outcome)))
-=======
+    _tell(output)
+
+
 def bench_verification(
     output: Annotated[Path, _output_option("verification")] = Path("out/bench/verification"),
     draw: PlotsOption = True,
@@ -411,7 +408,6 @@ def bench_verification(
             ],
         )
     )
->>>>>>> 67c69a1 (Add palpate bench verification, a soak of mechanics, and an example per capability)
     _tell(output)
 
 
@@ -445,10 +441,7 @@ for _name, _command in (
     ("scaling", bench_scaling),
     ("peers", bench_peers),
     ("realtime", bench_realtime),
-<<<<<<< HEAD
     ("cutting", bench_cutting),
-=======
     ("verification", bench_verification),
->>>>>>> 67c69a1 (Add palpate bench verification, a soak of mechanics, and an example per capability)
 ):
     bench_app.command(_name)(reporting(_command))
