@@ -1,6 +1,7 @@
 //! What each step of a model costs: contacts, solver effort, speeds and the time of every stage.
 //!
-//! `cargo run --release -p palpate-mechanics --example scene_cost MODEL [STEPS [EVERY [FRICTION [AHEAD]]]]`
+//! `cargo run --release -p palpate-mechanics --example scene_cost MODEL [STEPS [EVERY [FRICTION [AHEAD
+//! [THREADS]]]]]`
 
 #![allow(clippy::print_stdout)] // it is what the example is for
 
@@ -14,10 +15,11 @@ use palpate_geometry::Point;
 use palpate_mechanics::{Dynamics, DynamicsOptions};
 use palpate_model::{CoreLoader, load_model};
 
-/// Largest value of `values`, and the one that half of them stay below.
-fn spread(values: &mut [f64]) -> [f64; 2] {
+/// The value that half of `values` stay below, the one that nine tenths do, and the largest.
+fn spread(values: impl Iterator<Item = f64>) -> [f64; 3] {
+    let mut values: Vec<f64> = values.collect();
     values.sort_by(f64::total_cmp);
-    [values[values.len() / 2], values[values.len() - 1]]
+    [values[values.len() / 2], values[9 * values.len() / 10], values[values.len() - 1]]
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -25,7 +27,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let path = arguments.next().ok_or("give the path of a model")?;
     let mut number = |default: f64| arguments.next().map_or(Ok(default), |text| text.parse());
     let (steps, every, friction) = (number(240.0)? as usize, number(20.0)? as usize, number(-1.0)?);
-    let ahead = number(0.0)?;
+    let (ahead, threads) = (number(0.0)?, number(1.0)? as usize);
     let mut model = load_model(Path::new(&path), &CoreLoader)?;
     if friction >= 0.0 {
         for body in &mut model.bodies {
@@ -33,18 +35,20 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
     }
     let meshes = model.bodies.iter().map(|body| Arc::clone(&body.mesh)).collect();
-    let mut dynamics = Dynamics::new(&model, DynamicsOptions::default())?;
+    let options = DynamicsOptions { threads, ..DynamicsOptions::default() };
+    let mut dynamics = Dynamics::new(&model, options)?;
     if ahead > 0.0 {
         let start = Instant::now();
         let columns = dynamics.prepare_contact(usize::MAX);
         println!("{columns} responses solved ahead in {:.2} s", start.elapsed().as_secs_f64());
     }
-    let mut scene = Scene::new(meshes, Some(&model.structure), SceneOptions::default())?;
+    let options = SceneOptions { threads, ..SceneOptions::default() };
+    let mut scene = Scene::new(meshes, Some(&model.structure), options)?;
     println!(
         "step contacts candidates newton refactored changes  residual  max m/s | detect predict \
          filter compliance solve advance refactor = mechanics [ms]"
     );
-    let (mut mechanics, mut detection) = (Vec::new(), Vec::new());
+    let mut times: Vec<[f64; 8]> = Vec::new();
     for step in 1..=steps {
         let positions: Vec<&[Point]> =
             (0..dynamics.body_count()).map(|body| dynamics.positions(body)).collect();
@@ -65,15 +69,16 @@ fn main() -> Result<(), Box<dyn Error>> {
             .map(|time| time.as_secs_f64() * 1e3);
         let sum: f64 = milliseconds.iter().sum();
         let detect = detect.as_secs_f64() * 1e3;
-        mechanics.push(sum);
-        detection.push(detect);
+        let [predict, filter, compliance, solve, advance, refactor] = milliseconds;
+        let step_times =
+            [detect, predict, filter, compliance, solve, advance, refactor, detect + sum];
+        times.push(step_times);
         if step % every == 0 {
             let bodies = 0..dynamics.body_count();
             let fastest = bodies
                 .flat_map(|body| dynamics.velocities(body))
                 .map(|v| v.iter().map(|x| x * x).sum::<f64>().sqrt())
                 .fold(0.0, f64::max);
-            let [predict, filter, compliance, solve, advance, refactor] = milliseconds;
             println!(
                 "{step:4} {:8} {:10} {:6} {:10} {:6} {:9.1e} {fastest:8.5} | {detect:6.2} {predict:7.2} \
                  {filter:6.2} {compliance:10.2} {solve:5.2} {advance:7.2} {refactor:7.2} = {sum:9.2}",
@@ -86,14 +91,14 @@ fn main() -> Result<(), Box<dyn Error>> {
             );
         }
     }
-    let rest = steps / 2;
-    for (name, range) in [("first half", 0..rest), ("second half", rest..steps)] {
-        let [mechanics, mechanics_worst] = spread(&mut mechanics[range.clone()]);
-        let [detection, detection_worst] = spread(&mut detection[range]);
-        println!(
-            "{name}: mechanics median {mechanics:.2} worst {mechanics_worst:.2} ms, detection \
-             median {detection:.2} worst {detection_worst:.2} ms"
-        );
+    let stages =
+        ["detect", "predict", "filter", "compliance", "solve", "advance", "refactor", "step"];
+    for (name, range) in [("first half", 0..steps / 2), ("second half", steps / 2..steps)] {
+        println!("{name}: median, 90th percentile, worst [ms]");
+        for (stage, label) in stages.iter().enumerate() {
+            let [median, high, worst] = spread(times[range.clone()].iter().map(|t| t[stage]));
+            println!("  {label:10} {median:7.2} {high:7.2} {worst:7.2}");
+        }
     }
     Ok(())
 }

@@ -122,6 +122,12 @@ struct Probe {
     error: f64,
 }
 
+impl Default for Packed {
+    fn default() -> Self {
+        Self::Double(PackedFactor::default())
+    }
+}
+
 /// Memory for solves with one factor, for one thread.
 #[derive(Debug, Default)]
 pub struct SolveWorkspace {
@@ -210,7 +216,7 @@ impl Cholesky {
             symbolic,
             values,
             precision,
-            packed: Packed::Double(PackedFactor::default()),
+            packed: Packed::default(),
             scratch,
         };
         result.refactor(matrix)?;
@@ -252,13 +258,23 @@ impl Cholesky {
         };
         let factor = SupernodalLltRef::new(symbolic, &self.values);
         if self.precision == Precision::Single {
-            self.packed = Packed::Single(PackedFactor::new(factor));
+            let mut packed = match std::mem::take(&mut self.packed) {
+                Packed::Single(packed) => packed,
+                Packed::Double(_) => PackedFactor::default(),
+            };
+            packed.fill(factor);
+            self.packed = Packed::Single(packed);
             let Probe { residual, error } = self.probe(matrix);
             if residual < SINGLE_PROBE_TOLERANCES[0] && error < SINGLE_PROBE_TOLERANCES[1] {
                 return Ok(());
             }
         }
-        self.packed = Packed::Double(PackedFactor::new(factor));
+        let mut packed = match std::mem::take(&mut self.packed) {
+            Packed::Double(packed) => packed,
+            Packed::Single(_) => PackedFactor::default(),
+        };
+        packed.fill(factor);
+        self.packed = Packed::Double(packed);
         let Probe { residual, .. } = self.probe(matrix);
         if residual < PROBE_TOLERANCE { Ok(()) } else { Err(FactorError::Inaccurate { residual }) }
     }

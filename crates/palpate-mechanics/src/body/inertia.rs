@@ -52,6 +52,7 @@ impl Default for RunningInertia {
 }
 
 impl RunningInertia {
+    #[inline]
     pub(super) fn add(&mut self, mass: f64, position: DVec3, velocity: DVec3) {
         let (origin, drift) = *self.origin.get_or_insert((position, velocity));
         let (r, v) = (position - origin, velocity - drift);

@@ -10,8 +10,9 @@
 //! whole panel. A solve is bound by reading it once per pass, so that single precision halves its time.
 
 use faer::linalg::triangular_solve;
+use faer::reborrow::ReborrowMut;
 use faer::sparse::linalg::cholesky::supernodal::SupernodalLltRef;
-use faer::{Mat, Par};
+use faer::{MatMut, Par};
 use pulp::Simd;
 
 use super::real::Real;
@@ -69,16 +70,24 @@ pub(super) struct PackedWorkspace<T> {
 }
 
 impl<T: Real> PackedFactor<T> {
-    pub(super) fn new(factor: SupernodalLltRef<'_, u32, f64>) -> Self {
-        let mut result = Self { size: factor.symbolic().nrows(), ..Self::default() };
+    /// Packs a factor in the memory of the last one.
+    pub(super) fn fill(&mut self, factor: SupernodalLltRef<'_, u32, f64>) {
+        self.size = factor.symbolic().nrows();
+        self.supernodes.clear();
+        self.pattern.clear();
+        self.panels.clear();
+        (self.widest, self.longest) = (0, 0);
+        let mut packed = Vec::new();
         for index in 0..factor.symbolic().n_supernodes() {
             let supernode = factor.supernode(index);
             let values = supernode.val();
             let (row_count, width) = (values.nrows(), values.ncols());
             let (top, below) = values.split_at_row(width);
-            let mut packed = Mat::<f64>::zeros(row_count, width);
-            let (mut inverse, mut product) = packed.as_mut().split_at_row_mut(width);
-            inverse.copy_from(Mat::<f64>::identity(width, width));
+            packed.clear();
+            packed.resize(row_count * width, 0.0);
+            let columns = MatMut::from_column_major_slice_mut(&mut packed, row_count, width);
+            let (mut inverse, mut product) = columns.split_at_row_mut(width);
+            inverse.rb_mut().diagonal_mut().fill(1.0);
             triangular_solve::solve_lower_triangular_in_place(top, inverse, Par::Seq);
             product.copy_from(below);
             triangular_solve::solve_upper_triangular_in_place(
@@ -86,28 +95,29 @@ impl<T: Real> PackedFactor<T> {
                 product.transpose_mut(),
                 Par::Seq,
             );
-            let pattern_start = result.pattern.len() as u32;
-            let panel_start = result.panels.len() as u32;
-            result.pattern.extend_from_slice(supernode.pattern());
+            let pattern_start = self.pattern.len() as u32;
+            let panel_start = self.panels.len() as u32;
+            self.pattern.extend_from_slice(supernode.pattern());
             for first in (0..row_count).step_by(ROWS) {
-                for col in 0..width.min(first + ROWS) {
-                    result.panels.push(std::array::from_fn(|lane| {
-                        let row = first + lane;
-                        if row < row_count { T::from_f64(packed[(row, col)]) } else { T::ZERO }
-                    }));
+                let last = row_count.min(first + ROWS);
+                for column in packed.chunks_exact(row_count).take(first + ROWS) {
+                    let mut panel = [T::ZERO; ROWS];
+                    for (entry, &value) in panel.iter_mut().zip(&column[first..last]) {
+                        *entry = T::from_f64(value);
+                    }
+                    self.panels.push(panel);
                 }
             }
-            result.supernodes.push(Supernode {
+            self.supernodes.push(Supernode {
                 start: supernode.start() as u32,
                 width: width as u32,
                 pattern_start,
-                pattern_end: result.pattern.len() as u32,
+                pattern_end: self.pattern.len() as u32,
                 panel_start,
             });
-            result.widest = result.widest.max(width);
-            result.longest = result.longest.max(row_count.next_multiple_of(ROWS));
+            self.widest = self.widest.max(width);
+            self.longest = self.longest.max(row_count.next_multiple_of(ROWS));
         }
-        result
     }
 
     pub(super) fn bytes(&self) -> usize {
