@@ -362,3 +362,15 @@ def test_a_law_that_does_not_exist_is_named(tmp_path):
     result = CliRunner().invoke(app, arguments)
     assert result.exit_code == 1
     assert 'law "rubber" is not known; it must be one of linear, corotated' in result.output
+
+
+def test_cutting_measures_a_long_cut(tmp_path):
+    run("bench", "cutting", "small", "--body", "lower", "--frames", 6, "-o", tmp_path)
+    results = json.loads((tmp_path / "results.json").read_text())
+    assert results["frames"] == 6
+    assert results["opened"] > 0
+    assert results["tetrahedra"][1] > results["tetrahedra"][0]
+    for spread in [results["usual"], *results["while_cutting"].values()]:
+        assert 0 <= spread["median"] <= spread["p99"] <= spread["worst"]
+    assert len(rows(tmp_path / "cutting.csv")) == 6
+    assert "| frame |" in (tmp_path / "report.md").read_text()
