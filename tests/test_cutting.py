@@ -118,7 +118,7 @@ def test_a_scene_keeps_its_tree_through_cuts():
         blade = palpate.Blade.plane([0.013 * number, 0.02, 0], [1, 0.3 * number, 0.1])
         cuts = scene.cut(blade)
         assert [each.body for each in every.cut(blade)] == [each.body for each in cuts]
-        shifted = [scene.positions(0), [*scene.positions(1), 0, 0, 0.001]]
+        shifted = [scene.positions(0), scene.positions(1) + np.array([0, 0, 0.001])]
         for each in (scene, every):
             each.update(shifted)
         assert scene.intersections().pairs.tolist() == every.intersections().pairs.tolist()
