@@ -133,7 +133,7 @@ def contact(
         third.plot(error, patch.heights * 1e3, ".", color=color, markersize=2.5, label=text)
     third.axhline(100, color="#999999", linestyle="--", linewidth=1)
     label(third, "Uniform pressure through two meshes", "error of the stress [%]", "height [mm]")
-    _legend(third, loc="upper left")
+    _legend(third, loc="lower left")
     for (friction, series), color in zip(slides.items(), COLORS, strict=False):
         slopes = np.array([each.slope for each in series])
         fourth.plot(slopes, [each.exact for each in series], color=color, linewidth=1)
