@@ -118,10 +118,10 @@ def test_walls_give_no_energy(law):
 def test_uniform_pressure_passes_through_meshes_that_do_not_match(lower, upper):
     result = touching.contact_patch(lower, upper)
     assert result.typical_error < 0.03
-    # What the contact gets wrong stays within a cell of it.
+    # What the contact gets wrong stays near it.
     cell = 0.1 / min(lower, upper)
-    far = np.abs(result.heights - 0.1) > 1.5 * cell
-    assert np.abs(result.stress[far] / -result.pressure - 1.0).max() < 0.03
+    far = np.abs(result.heights - 0.1) > 2 * cell
+    assert np.abs(result.stress[far] / -result.pressure - 1.0).max() < 0.02
 
 
 @pytest.mark.parametrize("law", ["linear", "corotated", "neo-hookean"])

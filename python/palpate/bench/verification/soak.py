@@ -47,8 +47,8 @@ def soak(minutes: float, seed: int) -> list[str]:
         way = random.normal(size=3)
         target = start[node] + random.uniform(0.01, 0.06) * way / np.linalg.norm(way)
         pull = simulation.pull(body.name, node, target, float(random.uniform(2.0, 40.0)))
-        for count in (30, 30):
-            for _ in range(count):
+        for pulled in (True, False):
+            for _ in range(30):
                 report = simulation.step()
                 steps += 1
                 deepest = max(deepest, report.max_depth / edge)
@@ -70,7 +70,8 @@ def soak(minutes: float, seed: int) -> list[str]:
                         f"{len(simulation.intersections())} pairs, {memory():.0f} MB",
                         flush=True,
                     )
-            pull.release()
+            if pulled:
+                pull.release()
     if settled and memory() > 1.1 * settled:
         faults.append(f"memory grew from {settled:.0f} to {memory():.0f} MB")
     if deep_since:
