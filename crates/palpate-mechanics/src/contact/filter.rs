@@ -11,15 +11,13 @@ use super::{ContactParameters, Surface, side};
 
 /// Slack in the tests of direction: a flat surface must not lose its contacts to round-off.
 const ANGLE_SLACK: f64 = 1e-6;
-/// The same for a pair that carried a force in the last step: where pushing and letting go turn the
-/// surfaces to and fro across a limit, a pair would come and go for ever and the bodies never rest.
-const LOADED_SLACK: f64 = 0.05;
 /// A node whose own surface faces away from the other body by more than this does not touch it.
 const FACING_LIMIT: f64 = 0.2;
 /// Edge pairs count only where both edges are sharper than this (sine of the angle between the
 /// faces): on smooth surfaces nodes against triangles do, up to a small part of the contact distance.
 const SHARP_EDGE: f64 = 0.25;
-/// The same for a pair that carried a force in the last step.
+/// The same for a pair that carried a force in the last step: where pushing and letting go flatten and
+/// sharpen an edge across the limit, a pair would come and go for ever and the bodies never rest.
 const LOADED_SHARP_EDGE: f64 = 0.125;
 /// Elements of one body closer than this at rest, in contact distances, do not push each other.
 const REST_NEIGHBOUR: f64 = 2.0;
@@ -130,7 +128,7 @@ impl Filter {
                 continue;
             }
             let gap = match pair.kind {
-                PairKind::VertexTriangle => self.vertex_triangle(pair, bodies, is_loaded(pair)),
+                PairKind::VertexTriangle => self.vertex_triangle(pair, bodies),
                 PairKind::EdgeEdge => edge_edge(pair, bodies, is_loaded(pair)),
             };
             if let Some(Meeting { gap, normal, offset }) = gap {
@@ -215,9 +213,7 @@ impl Filter {
         &self,
         pair: &ProximityPair,
         [own, other]: [BodyView<'_>; 2],
-        is_loaded: bool,
     ) -> Option<Meeting> {
-        let slack = if is_loaded { LOADED_SLACK } else { ANGLE_SLACK };
         let key = (pair.bodies[0], pair.nodes[0], pair.bodies[1]);
         if self.inside.binary_search(&key).is_ok() {
             return None;
@@ -234,8 +230,7 @@ impl Filter {
                 let edge = other.surface.mesh().triangle_edges()[triangle as usize][(zero + 1) % 3];
                 let triangles = other.surface.edge_triangles(edge);
                 let from = other.at(corners[(zero + 1) % 3]);
-                let away =
-                    |&(_, node): &(u32, u32)| leads_away(other.at(node) - from, normal, slack);
+                let away = |&(_, node): &(u32, u32)| leads_away(other.at(node) - from, normal);
                 if triangles[0].0 != triangle || (gap > 0.0 && !triangles.iter().all(away)) {
                     return None;
                 }
@@ -244,7 +239,7 @@ impl Filter {
             _ => {
                 let corner = corners[weights.iter().position(|&weight| weight != 0.0)?];
                 let from = other.at(corner);
-                let away = |&node: &u32| leads_away(other.at(node) - from, normal, slack);
+                let away = |&node: &u32| leads_away(other.at(node) - from, normal);
                 if other.surface.node_triangles(corner)[0] != triangle
                     || (gap > 0.0 && !other.surface.node_neighbours(corner).iter().all(away))
                 {
@@ -326,8 +321,7 @@ fn edge_edge(
     [own, other]: [BodyView<'_>; 2],
     is_loaded: bool,
 ) -> Option<Meeting> {
-    let (slack, sharp_edge) =
-        if is_loaded { (LOADED_SLACK, LOADED_SHARP_EDGE) } else { (ANGLE_SLACK, SHARP_EDGE) };
+    let sharp_edge = if is_loaded { LOADED_SHARP_EDGE } else { SHARP_EDGE };
     if pair.weights.contains(&0.0) {
         return None;
     }
@@ -335,7 +329,7 @@ fn edge_edge(
     let inside_cone = |body: &BodyView<'_>, edge: u32, from: u32, direction: DVec3| {
         let triangles = body.surface.edge_triangles(edge);
         let from = body.at(from);
-        let away = |&(_, node): &(u32, u32)| leads_away(body.at(node) - from, direction, slack);
+        let away = |&(_, node): &(u32, u32)| leads_away(body.at(node) - from, direction);
         let convex = match triangles {
             [(first, _), (second, _)] => {
                 let first = body.surface.triangle_normal(*first, body.positions);
@@ -357,8 +351,8 @@ fn edge_edge(
 }
 
 /// True when going along `step` does not come closer to a point in direction `normal`.
-fn leads_away(step: DVec3, normal: DVec3, slack: f64) -> bool {
-    step.dot(normal) <= slack * step.length()
+fn leads_away(step: DVec3, normal: DVec3) -> bool {
+    step.dot(normal) <= ANGLE_SLACK * step.length()
 }
 
 /// Distance between the two contact points when the body is at rest [m].
