@@ -19,6 +19,8 @@ const SHARP_EDGE: f64 = 0.25;
 /// The same for a pair that carried a force in the last step: where pushing and letting go flatten and
 /// sharpen an edge across the limit, a pair would come and go for ever and the bodies never rest.
 const LOADED_SHARP_EDGE: f64 = 0.125;
+/// Slack in the tests of direction of such a pair.
+const LOADED_SLACK: f64 = 0.05;
 /// Elements of one body closer than this at rest, in contact distances, do not push each other.
 const REST_NEIGHBOUR: f64 = 2.0;
 /// A node behind its own body's surface has passed through it when the two were this many times
@@ -230,7 +232,9 @@ impl Filter {
                 let edge = other.surface.mesh().triangle_edges()[triangle as usize][(zero + 1) % 3];
                 let triangles = other.surface.edge_triangles(edge);
                 let from = other.at(corners[(zero + 1) % 3]);
-                let away = |&(_, node): &(u32, u32)| leads_away(other.at(node) - from, normal);
+                let away = |&(_, node): &(u32, u32)| {
+                    leads_away(other.at(node) - from, normal, ANGLE_SLACK)
+                };
                 if triangles[0].0 != triangle || (gap > 0.0 && !triangles.iter().all(away)) {
                     return None;
                 }
@@ -239,7 +243,7 @@ impl Filter {
             _ => {
                 let corner = corners[weights.iter().position(|&weight| weight != 0.0)?];
                 let from = other.at(corner);
-                let away = |&node: &u32| leads_away(other.at(node) - from, normal);
+                let away = |&node: &u32| leads_away(other.at(node) - from, normal, ANGLE_SLACK);
                 if other.surface.node_triangles(corner)[0] != triangle
                     || (gap > 0.0 && !other.surface.node_neighbours(corner).iter().all(away))
                 {
@@ -321,7 +325,8 @@ fn edge_edge(
     [own, other]: [BodyView<'_>; 2],
     is_loaded: bool,
 ) -> Option<Meeting> {
-    let sharp_edge = if is_loaded { LOADED_SHARP_EDGE } else { SHARP_EDGE };
+    let (slack, sharp_edge) =
+        if is_loaded { (LOADED_SLACK, LOADED_SHARP_EDGE) } else { (ANGLE_SLACK, SHARP_EDGE) };
     if pair.weights.contains(&0.0) {
         return None;
     }
@@ -329,7 +334,7 @@ fn edge_edge(
     let inside_cone = |body: &BodyView<'_>, edge: u32, from: u32, direction: DVec3| {
         let triangles = body.surface.edge_triangles(edge);
         let from = body.at(from);
-        let away = |&(_, node): &(u32, u32)| leads_away(body.at(node) - from, direction);
+        let away = |&(_, node): &(u32, u32)| leads_away(body.at(node) - from, direction, slack);
         let convex = match triangles {
             [(first, _), (second, _)] => {
                 let first = body.surface.triangle_normal(*first, body.positions);
@@ -351,8 +356,8 @@ fn edge_edge(
 }
 
 /// True when going along `step` does not come closer to a point in direction `normal`.
-fn leads_away(step: DVec3, normal: DVec3) -> bool {
-    step.dot(normal) <= ANGLE_SLACK * step.length()
+fn leads_away(step: DVec3, normal: DVec3, slack: f64) -> bool {
+    step.dot(normal) <= slack * step.length()
 }
 
 /// Distance between the two contact points when the body is at rest [m].
