@@ -206,6 +206,13 @@ impl MovingBody {
                     &mut self.next_positions,
                     &mut self.next_velocities,
                 );
+                elastic.find_driven_forces(
+                    &self.velocities,
+                    &self.forces,
+                    &self.contact_forces,
+                    &self.next_positions,
+                    &self.next_velocities,
+                );
             }
             BodyKind::Rigid(_) => {
                 self.next_positions.copy_from_slice(&self.expected_positions);

@@ -1,6 +1,7 @@
 //! The bodies in motion: two calls per step, with contact detection by the caller between them.
 
 mod change;
+mod drive;
 mod hands;
 
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -20,6 +21,8 @@ use crate::energy::{Energy, Momentum};
 use crate::error::MechanicsError;
 use crate::state::{BodyState, ContactForce, State};
 use crate::ties::Ties;
+pub use drive::Drive;
+use drive::Drives;
 
 /// Motion margin of a search, in mean edges of the finer deformable surface: contacts farther
 /// ahead are found in a later step, or as penetrations.
@@ -118,6 +121,7 @@ pub struct Dynamics {
     parameters: Vec<ContactParameters>,
     response: Response,
     ties: Ties,
+    drives: Drives,
     start_time: f64,
     start_step: u64,
     step: u64,
@@ -202,6 +206,7 @@ impl Dynamics {
             surfaces,
             parameters,
             ties,
+            drives: Drives::default(),
             start_time: 0.0,
             start_step: 0,
             step: 0,
@@ -373,6 +378,7 @@ impl Dynamics {
         stats.refactored = refactored.count();
         response.remember();
         self.ties.finish(response.tie_forces());
+        self.finish_drives();
         self.step += 1;
         Ok(stats)
     }
@@ -554,6 +560,7 @@ impl Dynamics {
             bodies: bodies.collect(),
             contacts: self.response.last().forces().to_vec(),
             pulls: self.ties.pulls().to_vec(),
+            drives: self.drives.all().to_vec(),
         }
     }
 
@@ -596,6 +603,7 @@ impl Dynamics {
         if let Some(index) = state.contacts.iter().position(|contact| !fits(contact)) {
             return Err(MechanicsError::BadContact(index));
         }
+        self.check_drives(&state.drives)?;
         for pull in &state.pulls {
             self.check_pull(pull.body as usize, pull.node as usize, pull.target, pull.stiffness)?;
         }
@@ -608,6 +616,10 @@ impl Dynamics {
             body.set_shape(saved);
         }
         self.ties.restore(&state.pulls);
+        self.drives.restore(&state.drives);
+        for body in 0..self.body_count() {
+            self.apply_drives(body);
+        }
         self.set_contact_forces(&state.contacts);
         self.response.restore(&state.contacts);
         (self.start_time, self.start_step) = state.clock_start;

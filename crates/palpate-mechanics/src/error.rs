@@ -145,6 +145,28 @@ pub enum MechanicsError {
     /// A rotation that turns nothing, not even by nothing.
     #[error("a rotation must be finite and not zero")]
     Rotation,
+    /// Nothing to drive.
+    #[error("expected at least one node, got none")]
+    NoNodes,
+    /// Nodes of a rigid body.
+    #[error("body {0} is rigid: move it as a tool")]
+    RigidDriven(usize),
+    /// A node that two drives would move.
+    #[error("node {node} of body {body} is driven already: release that first")]
+    DrivenTwice {
+        /// Index of the body.
+        body: usize,
+        /// The node.
+        node: usize,
+    },
+    /// A driven node that its model does not hold.
+    #[error("node {node} of body {body} is not fixed, so that it cannot be driven")]
+    NotFixed {
+        /// Index of the body.
+        body: usize,
+        /// The node.
+        node: usize,
+    },
     /// A spring that is gone.
     #[error("this was released before, or belongs to another state")]
     Released,

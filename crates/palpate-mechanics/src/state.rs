@@ -3,6 +3,7 @@
 use palpate_geometry::Point;
 use palpate_model::Pose;
 
+use crate::dynamics::Drive;
 use crate::ties::Pull;
 
 /// Everything the next step depends on; restoring it continues bit for bit.
@@ -21,6 +22,8 @@ pub struct State {
     pub contacts: Vec<ContactForce>,
     /// Springs that pull nodes.
     pub pulls: Vec<Pull>,
+    /// Nodes that are moved along a path.
+    pub drives: Vec<Drive>,
 }
 
 /// The force of one contact in the last step.

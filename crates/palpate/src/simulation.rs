@@ -1,6 +1,7 @@
 //! The step loop: detect, respond, move.
 
 mod change;
+mod drive;
 mod hands;
 
 use std::ops::AddAssign;

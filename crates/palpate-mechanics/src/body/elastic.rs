@@ -12,6 +12,7 @@
 //! of the rest shape, in that frame, is exact. With any other law A is where a quasi-Newton method
 //! begins, and it follows the shape of the body; with the linear law its factor is made once.
 
+mod driven;
 mod quasi_newton;
 mod spin;
 mod step;
@@ -25,6 +26,7 @@ use palpate_solver::{BlockMatrix, Cholesky, FactorStats, HalfSolution, NodeOrder
 use super::frame::best_rotation;
 use super::inertia::Inertia;
 use crate::error::MechanicsError;
+use driven::Driven;
 use quasi_newton::QuasiNewton;
 use step::Step;
 use system::{SystemMatrix, check_material, in_body_numbering, linear_stiffness, lumped_masses};
@@ -46,6 +48,8 @@ pub(crate) struct ElasticBody {
     mass_damping: f64,
     gravity: DVec3,
     time_step: f64,
+    /// Fixed nodes that are moved, ascending.
+    driven: Vec<Driven>,
     step: Step,
 }
 
@@ -151,6 +155,7 @@ impl ElasticBody {
             mass_damping: material.mass_damping,
             gravity: DVec3::from_array(gravity),
             time_step,
+            driven: Vec::new(),
             step,
         })
     }

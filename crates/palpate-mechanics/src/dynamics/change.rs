@@ -38,6 +38,8 @@ impl Dynamics {
             contacts.into_iter().filter_map(|contact| moved(contact, index, &copies)).collect();
         let released = self.ties.change_body(index as u32, |node| copies[node as usize]);
         *self.body_mut(index) = changed;
+        self.drives.change_body(index as u32, |node| copies[node as usize]);
+        self.apply_drives(index);
         self.surfaces[index] = Surface::new(&body.mesh);
         self.parameters[index] = parameters;
         self.response.forget_body(index);
@@ -97,6 +99,14 @@ impl State {
             contact.bodies = here;
             true
         });
+        for drive in &mut state.drives {
+            // The part that the first of them went to; the rest is let go.
+            let found = drive.nodes.iter().find_map(|&node| place(drive.body, node));
+            let Some((body, _)) = found else { continue };
+            let before = std::mem::replace(&mut drive.body, body);
+            drive.follow(|node| place(before, node).filter(|new| new.0 == body).map(|new| new.1));
+        }
+        state.drives.retain(|drive| !drive.nodes.is_empty());
         state.pulls.retain_mut(|pull| {
             let found = place(pull.body, pull.node);
             (pull.body, pull.node) = found.unwrap_or((pull.body, pull.node));

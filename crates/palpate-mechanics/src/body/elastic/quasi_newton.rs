@@ -133,6 +133,16 @@ impl QuasiNewton {
         self.system_of_arms(masses, inertia, time_step)
     }
 
+    /// Finds the internal forces at the end of the step that has begun.
+    pub(super) fn forces_at(&mut self, x: &[Point]) {
+        self.tissue.forces(x, &mut self.forces);
+    }
+
+    /// Internal force on a node where they were found last [N].
+    pub(super) fn force(&self, node: usize) -> DVec3 {
+        DVec3::from_array(self.forces[node])
+    }
+
     /// Says that A is made of the stiffness at `shape`.
     pub(super) fn set_stiff_shape(&mut self, shape: &[Point]) {
         self.stiff_shape.clear();

@@ -24,8 +24,8 @@ pub(super) struct Step {
     pub(super) velocities: Vec<DVec3>,
     /// Velocity of the deformation in the frame, without the body's rotation.
     deformation: Vec<DVec3>,
-    strain: Vec<[f64; 3]>,
-    force: Vec<[f64; 3]>,
+    pub(super) strain: Vec<[f64; 3]>,
+    pub(super) force: Vec<[f64; 3]>,
     /// Correction of the free nodes in the frame [m].
     pub(super) correction: Vec<[f64; 3]>,
     /// Response of the free nodes in the frame to the contact forces that are expected [m].
@@ -76,6 +76,17 @@ impl Step {
     }
 }
 
+impl Step {
+    pub(super) fn center(&self) -> DVec3 {
+        self.center
+    }
+
+    /// Velocity of the deformation at a node, in the frame [m/s].
+    pub(super) fn deformation(&self, node: usize) -> DVec3 {
+        self.deformation[node]
+    }
+}
+
 impl ElasticBody {
     /// Predicts the motion and corrects it by all forces, `contact` being those of the last step.
     pub(in crate::body) fn predict(
@@ -96,6 +107,7 @@ impl ElasticBody {
                 *predicted = if free { x + dt * v } else { x };
                 self.step.velocities[node] = if free { v } else { DVec3::ZERO };
             }
+            self.predict_driven(x);
         }
         (self.step.center, self.step.frame) = self.place_of(self.step.positions.iter().copied());
         self.find_rotations();
@@ -313,7 +325,7 @@ impl ElasticBody {
     }
 
     /// Displacement of the free nodes from the prediction.
-    fn corrections(&self) -> impl Iterator<Item = (usize, DVec3)> {
+    pub(super) fn corrections(&self) -> impl Iterator<Item = (usize, DVec3)> {
         let step = &self.step;
         let parts = step.correction.iter().zip(&step.expected).zip(&step.response);
         self.free_nodes.iter().zip(parts).map(|(&node, ((&a, &b), &c))| {
@@ -328,6 +340,7 @@ impl ElasticBody {
         for (node, d) in self.corrections() {
             positions[node] = (self.step.positions[node] + d).to_array();
         }
+        self.place_driven(positions);
     }
 
     /// The state after the step.
@@ -344,6 +357,7 @@ impl ElasticBody {
         for (node, d) in self.corrections() {
             next_v[node] = (self.step.velocities[node] + d / self.time_step).to_array();
         }
+        self.move_driven(next_v);
         if self.is_unattached() {
             let target = self.next_spin(x, forces, contact_forces);
             self.correct_spin(target, self.step.touched, next_x, next_v);
