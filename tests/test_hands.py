@@ -115,3 +115,71 @@ def test_bad_rotations(simulation: palpate.Simulation, rotation: np.ndarray, mes
     _, rigid = soft_and_rigid(simulation)
     with pytest.raises(ValueError, match=message):
         simulation.tool(rigid).set_pose(rotation, [0, 0, 0])
+
+
+def test_driven_nodes_follow_their_path(simulation: palpate.Simulation) -> None:
+    soft, _ = soft_and_rigid(simulation)
+    nodes = [7, 3, 5]
+    start = simulation.positions[soft][nodes].copy()
+    asked = []
+
+    def path(time: float) -> np.ndarray:
+        asked.append(time)
+        return start + np.array([0.02 * time, 0, 0.01])
+
+    drive = simulation.drive(soft, nodes, path)
+    report = simulation.step(4)
+    assert report.step == 4
+    assert sum(report.stages.values()) > 0
+    assert asked[-4:] == pytest.approx([1 / 60, 2 / 60, 3 / 60, 4 / 60])
+    np.testing.assert_array_equal(simulation.positions[soft][nodes], path(simulation.time))
+    np.testing.assert_array_equal(drive.nodes, [3, 5, 7])
+    assert drive.body == soft
+    assert drive.force.shape == (3, 3)
+    assert np.abs(drive.force).max() > 0
+    np.testing.assert_array_equal(simulation.model.bodies[soft].fixed_nodes, [3, 5, 7])
+    snapshot = simulation.snapshot()
+    drive.release()
+    assert repr(drive) == "Drive(released)"
+    assert len(simulation.model.bodies[soft].fixed_nodes) == 0
+    simulation.step(2)
+    simulation.restore(snapshot)
+    simulation.step()
+    np.testing.assert_array_equal(simulation.positions[soft][nodes], path(simulation.time))
+
+
+def test_nodes_are_driven_step_by_step(simulation: palpate.Simulation) -> None:
+    soft, _ = soft_and_rigid(simulation)
+    goal = simulation.positions[soft][[4]] + np.array([0, 0, 0.002])
+    drive = simulation.drive(soft, [4], goal)
+    simulation.step()
+    np.testing.assert_array_equal(simulation.positions[soft][[4]], goal)
+    drive.move_to(goal[0] + np.array([0, 0, 0.002]))
+    simulation.step(2)
+    np.testing.assert_array_equal(simulation.positions[soft][4], goal[0] + [0, 0, 0.002])
+
+
+@pytest.mark.parametrize(
+    ("nodes", "path", "error", "message"),
+    [
+        ([10**6], [[0, 0, 0]], palpate.SimulationError, "node 1000000 does not exist"),
+        ([-1], [[0, 0, 0]], ValueError, "nodes: row 0 holds -1"),
+        ([], np.zeros((0, 3)), palpate.SimulationError, "expected at least one node"),
+        ([1, 1], np.zeros((2, 3)), ValueError, "each node may be named once"),
+        ([1, 2], np.zeros((3, 3)), ValueError, r"path: expected shape \(2, 3\), got \(3, 3\)"),
+        ([1], [[0, np.nan, 0]], palpate.SimulationError, "the target of node 1 of body 0"),
+        ([1.5], [[0, 0, 0]], TypeError, "nodes: expected integers"),
+        ([1], lambda _: "up", (TypeError, ValueError), "path"),
+    ],
+)
+def test_bad_drives(
+    simulation: palpate.Simulation,
+    nodes: list,
+    path: object,
+    error: type[Exception],
+    message: str,
+) -> None:
+    with pytest.raises(error, match=message):
+        simulation.drive(0, nodes, path)
+    assert len(simulation.model.bodies[0].fixed_nodes) == 0
+    simulation.step()

@@ -27,7 +27,7 @@ from palpate.errors import (
     SimulationError,
 )
 from palpate.files import read_mesh, write_mesh
-from palpate.hands import Pull, Tool
+from palpate.hands import Drive, Pull, Tool
 from palpate.mesh import Defect, Mesh
 from palpate.meshing import label_surface, mesh_image, mesh_surface
 from palpate.model import (
@@ -56,6 +56,7 @@ __all__ = [
     "Defect",
     "DetectionStats",
     "Diagnostic",
+    "Drive",
     "Intersections",
     "Material",
     "Mesh",

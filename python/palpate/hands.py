@@ -1,7 +1,8 @@
-"""What a user's hands do in a simulation: pull tissue by springs, move rigid tools."""
+"""What a user's hands do: pull tissue by springs, drive nodes along paths, move rigid tools."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -82,6 +83,91 @@ class Pull:
             return "Pull(released)"
         state = self._state()
         return f"Pull(body {state.body}, node {state.node}, {state.stiffness:g} N/m)"
+
+
+class Drive:
+    """Nodes that are moved along a path, made by `Simulation.drive`.
+
+    It is part of the simulation's state, as a `Pull` is; a path that is a function is this object's
+    own, and goes on with the time of the simulation.
+    """
+
+    def __init__(
+        self,
+        core: _core.Simulation,
+        identity: int,
+        places: npt.NDArray[np.intp],
+        path: Callable[[float], npt.ArrayLike] | None,
+        changed: Callable[[], None],
+    ) -> None:
+        self._core = core
+        self._id = identity
+        # The core has the nodes in ascending order.
+        self._places = places
+        self._path = path
+        self._changed = changed
+
+    def _state(self) -> tuple[int, npt.NDArray[np.int32], Float64Array, Float64Array]:
+        state = self._core.driven(self._id)
+        if state is None:
+            raise ValueError("this was released before, or belongs to another state")
+        return state
+
+    @property
+    def is_active(self) -> bool:
+        """Whether it still moves its nodes."""
+        return self._core.driven(self._id) is not None
+
+    @property
+    def body(self) -> int:
+        """Index of the body."""
+        return self._state()[0]
+
+    @property
+    def nodes(self) -> npt.NDArray[np.int32]:
+        """The nodes (k,), in ascending order."""
+        return self._state()[1]
+
+    @property
+    def targets(self) -> Float64Array:
+        """Where the nodes are at the end of the next step [m], shape (k, 3)."""
+        return self._state()[2]
+
+    @property
+    def force(self) -> Float64Array:
+        """Force that moved each node in the last step [N], shape (k, 3)."""
+        return self._state()[3]
+
+    def move_to(self, positions: npt.ArrayLike) -> None:
+        """Say where the nodes are at the end of the next step [m].
+
+        ``positions`` has shape (k, 3), in the order in which the nodes were given to
+        `Simulation.drive` (in ascending order once a cut has changed them), or (3,) for a single
+        node.
+        """
+        count = len(self._state()[1])
+        array = np.asarray(positions)
+        if count == 1 and array.shape == (3,):
+            array = array[None]
+        array = _arrays.points(array, "path", count)
+        places = self._places
+        self._core.set_drive_targets(self._id, array[places] if len(places) == count else array)
+
+    def follow(self, time: float) -> None:
+        """Take the targets from the path at a time [s]; without a function nothing changes."""
+        if self._path is not None:
+            self.move_to(self._path(time))
+
+    def release(self) -> None:
+        """Let the nodes go; those that the model holds stay fixed."""
+        self._core.release_drive(self._id)
+        self._changed()
+
+    def __repr__(self) -> str:
+        if not self.is_active:
+            return "Drive(released)"
+        body, nodes, *_ = self._state()
+        return f"Drive(body {body}, {len(nodes)} nodes)"
 
 
 class Tool:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -23,7 +23,7 @@ from palpate.cutting import (
     chosen,
     cut_options,
 )
-from palpate.hands import Pull, Tool
+from palpate.hands import Drive, Pull, Tool
 from palpate.mesh import Mesh
 from palpate.model import Body, Model, body_index, read_model
 from palpate.scene import METHODS, SPLITS, _choice
@@ -136,10 +136,11 @@ class Simulation:
 
     def _start(self, core: _core.Simulation) -> None:
         self._core = core
+        self._drives: list[Drive] = []
         self._changed()
 
     def _changed(self) -> None:
-        """Look at the model again: cuts change it."""
+        """Look at the model again: cuts and drives change it."""
         core = self._core
         self._model = Model._from_core(core.model)
         self._names = [body.name for body in self._model.bodies]
@@ -188,7 +189,17 @@ class Simulation:
         SimulationError
             If a step fails; the state is then that before the failed step.
         """
-        return StepReport(**self._core.step(_arrays.count(count, "count")))
+        count = _arrays.count(count, "count")
+        # Those that were released stay known: a snapshot may bring them back.
+        drives = [drive for drive in self._drives if drive.is_active]
+        if not drives:
+            return StepReport(**self._core.step(count))
+        reports = []
+        for _ in range(count):
+            for drive in drives:
+                drive.follow(self.time + self.time_step)
+            reports.append(StepReport(**self._core.step(1)))
+        return _together(reports)
 
     def set_positions(self, body: int | str, positions: npt.ArrayLike) -> None:
         """Put the nodes of a body elsewhere; positions [m], shape (n, 3)."""
@@ -240,6 +251,65 @@ class Simulation:
         goal = _arrays.vector(target, "target")
         identity = self._core.pull(index, node, goal, _arrays.scalar(stiffness, "stiffness"))
         return Pull(self._core, identity)
+
+    def drive(
+        self,
+        body: int | str,
+        nodes: npt.ArrayLike,
+        path: Callable[[float], npt.ArrayLike] | npt.ArrayLike,
+    ) -> Drive:
+        """Move nodes of a body along a path, whatever it takes.
+
+        Parameters
+        ----------
+        body : int or str
+            The body, by index or name.
+        nodes : (k,) integers
+            The nodes; fixed ones may be driven as well.
+        path : function or (k, 3)
+            Positions [m] of the nodes at a time [s], in their order: called before every step with
+            the time at its end. Or where they are to be at the end of the next step, to be moved on
+            by `Drive.move_to`.
+
+        Returns
+        -------
+        Drive
+            Read its `Drive.force`, and `Drive.release` it.
+
+        Notes
+        -----
+        The body's matrix is made anew here and at the release.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import palpate
+        >>> simulation = palpate.Simulation("small")
+        >>> nodes = [0, 1, 2]
+        >>> start = simulation.positions[0][nodes]
+        >>> drive = simulation.drive(0, nodes, lambda time: start + [0, 0, 0.05 * time])
+        >>> report = simulation.step(6)
+        >>> bool(np.allclose(simulation.positions[0][nodes], start + [0, 0, 0.005]))
+        True
+        """
+        index = self._index(body)
+        chosen = _arrays.indices(nodes, "nodes", None)
+        if len(np.unique(chosen)) != len(chosen):
+            raise ValueError("nodes: each node may be named once")
+        identity = self._core.drive(index, chosen)
+        follows = path if callable(path) else None
+        drive = Drive(self._core, identity, chosen.argsort(), follows, self._changed)
+        self._changed()
+        try:
+            if callable(path):
+                drive.follow(self.time + self.time_step)
+            else:
+                drive.move_to(path)
+        except Exception:
+            drive.release()
+            raise
+        self._drives.append(drive)
+        return drive
 
     def cut(
         self,
@@ -438,6 +508,21 @@ class Simulation:
 
     def __repr__(self) -> str:
         return f"Simulation({len(self._names)} bodies, t = {self.time:.4g} s)"
+
+
+def _together(reports: Sequence[StepReport]) -> StepReport:
+    """One report of several steps."""
+
+    def summed(parts: Sequence[dict[str, float]]) -> dict[str, float]:
+        return {name: sum(part[name] for part in parts) for name in parts[0]}
+
+    return replace(
+        reports[-1],
+        times=summed([each.times for each in reports]),
+        stages=summed([each.stages for each in reports]),
+        newton_iterations=sum(each.newton_iterations for each in reports),
+        iterations=sum(each.iterations for each in reports),
+    )
 
 
 class Snapshot:

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use glam::DQuat;
-use numpy::{PyArray1, PyArray2, PyReadonlyArray2};
+use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2};
 use palpate::contact::{IntersectionOptions, PairKind};
 use palpate::geometry::Point;
 use palpate::mechanics::Pull;
@@ -13,7 +13,7 @@ use palpate::{ChangeReport, Simulation, SimulationOptions, Snapshot, StepReport,
 use pyo3::prelude::*;
 use pyo3::types::{IntoPyDict, PyDict, PyTuple};
 
-use crate::arrays::{index_matrix, matrix, points, vector};
+use crate::arrays::{index, index_matrix, index_vector, matrix, points, vector};
 use crate::cutting::{self, ChangeColumns, Options, PyBlade, change_columns, report_row};
 use crate::errors::raise;
 use crate::model::PyModel;
@@ -58,6 +58,8 @@ impl PySimulation {
 }
 
 type Vec3 = (f64, f64, f64);
+type DriveRow<'py> =
+    (u32, Bound<'py, PyArray1<i32>>, Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>);
 
 /// Body, what became of its mesh, what the cut did, springs that were released.
 type BodyChangeRow<'py> = (usize, ChangeColumns<'py>, Option<Bound<'py, PyDict>>, Vec<u64>);
@@ -228,6 +230,42 @@ impl PySimulation {
     fn pulls(&self) -> BTreeMap<u64, (u32, u32, Vec3, f64, Vec3)> {
         let row = |p: &Pull| (p.id, (p.body, p.node, p.target.into(), p.stiffness, p.force.into()));
         self.lock().pulls().iter().map(row).collect()
+    }
+
+    fn drive(
+        &self,
+        py: Python<'_>,
+        body: usize,
+        nodes: PyReadonlyArray1<'_, i64>,
+    ) -> PyResult<u64> {
+        let entries = nodes.as_slice()?.iter().enumerate();
+        let nodes: Vec<u32> =
+            entries.map(|(row, &node)| index(node, "nodes", row)).collect::<PyResult<_>>()?;
+        raise(py, py.detach(|| self.lock().drive(body, &nodes)))
+    }
+
+    fn set_drive_targets(
+        &self,
+        py: Python<'_>,
+        drive: u64,
+        targets: PyReadonlyArray2<'_, f64>,
+    ) -> PyResult<()> {
+        raise(py, self.lock().set_drive_targets(drive, points(&targets, "path")?))
+    }
+
+    fn release_drive(&self, py: Python<'_>, drive: u64) -> PyResult<()> {
+        raise(py, py.detach(|| self.lock().release_drive(drive)))
+    }
+
+    /// Body, nodes (ascending), targets and forces of a drive; `None` if it is gone.
+    fn driven<'py>(&self, py: Python<'py>, drive: u64) -> PyResult<Option<DriveRow<'py>>> {
+        let guard = self.lock();
+        let Some(found) = guard.drives().iter().find(|each| each.id == drive) else {
+            return Ok(None);
+        };
+        let (targets, forces) = (found.targets.clone(), found.forces.clone());
+        let nodes = index_vector(py, &found.nodes);
+        Ok(Some((found.body, nodes, matrix(py, targets)?, matrix(py, forces)?)))
     }
 
     /// Puts a rigid body; `rotation` is a unit quaternion, real part first.
