@@ -15,7 +15,7 @@ along, across, down = np.argsort(-size)  # the longest, the middle, the shortest
 
 def place(*parts: float) -> np.ndarray:
     """The point at these parts of the box, along, across and down; 0 is the middle, 1 a side."""
-    point = middle.copy()
+    point: np.ndarray = middle.copy()
     for axis, part in zip((along, across, down), parts, strict=True):
         point[axis] += part * size[axis] / 2
     return point
@@ -57,8 +57,7 @@ print(
 )
 
 if pictures.available():
-    up = np.zeros(3)
-    up[down] = 1.0
+    up = [1.0 if axis == down else 0.0 for axis in range(3)]
     camera = pictures.frame([points for _, points, _ in shown], up=up, elevation=50.0)
     images = [
         pictures.render([pictures.Shape(points, triangles, (0.66, 0.33, 0.25))], camera)
