@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import palpate
+from palpate.results.measures import node_means, von_mises
 
 
 @pytest.fixture
@@ -213,3 +214,28 @@ def test_two_soft_boxes_collide_and_keep_their_momentum(make_box):
     assert len(simulation.intersections()) == 0
     gap = simulation.positions[1][:, 0].mean() - simulation.positions[0][:, 0].mean()
     assert gap > 0.1
+
+
+def test_stress_is_that_of_the_load_it_carries(make_box):
+    box = make_box((3, 3, 3), size=0.1)
+    body = palpate.Body(
+        box,
+        name="bar",
+        material=palpate.Material(law="corotated", young=1e4, poisson=0.0, damping=0.1),
+        fixed_nodes=np.flatnonzero(box.nodes[:, 2] == box.nodes[:, 2].min()),
+    )
+    simulation = palpate.Simulation(palpate.Model([body], gravity=(0, 0, 0)), time_step=10.0)
+    top = np.flatnonzero(box.nodes[:, 2] == box.nodes[:, 2].max())
+    simulation.drive(0, top, box.nodes[top] + np.array([0, 0, 1e-4]))
+    simulation.step(4)
+    stress = simulation.stress("bar")
+    expected = [0, 0, 1e4 * 1e-4 / 0.1, 0, 0, 0]
+    assert np.allclose(stress, np.tile(expected, (len(box.tetrahedra), 1)), atol=2e-2)
+    assert np.allclose(von_mises(stress), 10.0, atol=2e-2)
+    assert np.allclose(node_means(von_mises(stress), box.tetrahedra, len(box.nodes)), 10, atol=2e-2)
+
+
+def test_bodies_without_stress_are_named(falling):
+    simulation = palpate.Simulation(falling)
+    with pytest.raises(ValueError, match="'plate' is rigid or of law linear"):
+        simulation.stress("plate")

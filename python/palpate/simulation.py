@@ -416,6 +416,29 @@ class Simulation:
         pairs, stats = self._core.intersections(bool(self_contact))
         return Intersections(pairs, DetectionStats(*stats))
 
+    def stress(self, body: int | str) -> Float64Array:
+        """Cauchy stress [Pa] of each tetrahedron of a body, without viscosity.
+
+        Returns
+        -------
+        (m, 6) float64
+            xx, yy, zz, xy, yz, xz.
+
+        Raises
+        ------
+        ValueError
+            If the body is rigid, or of law ``linear``, whose stress does not turn with the
+            elements: take ``corotated``.
+        """
+        index = self._index(body)
+        stress = self._core.stress(index)
+        if stress is None:
+            raise ValueError(
+                f"body {self._names[index]!r} is rigid or of law linear, which has no stress that "
+                "turns with the elements: take corotated"
+            )
+        return stress
+
     @property
     def factor_bytes(self) -> tuple[int, ...]:
         """Bytes of each body's factored matrix, what a solve has to read at least once."""

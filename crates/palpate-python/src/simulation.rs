@@ -367,6 +367,16 @@ impl PySimulation {
         Ok((index_matrix(py, &rows)?, stats))
     }
 
+    /// Cauchy stress of each tetrahedron; `None` where there is none.
+    fn stress<'py>(
+        &self,
+        py: Python<'py>,
+        body: usize,
+    ) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
+        let stress = py.detach(|| self.lock().cauchy_stress(body));
+        stress.map(|rows| matrix(py, rows)).transpose()
+    }
+
     /// Bytes of each body's factor as a solve reads it; 0 for a rigid one.
     fn factor_bytes(&self) -> Vec<usize> {
         let guard = self.lock();

@@ -366,6 +366,12 @@ impl Simulation {
         Ok(Self { model, options, scene, dynamics, initial, penetration: Vec::new() })
     }
 
+    /// Cauchy stress [Pa] of each tetrahedron: xx, yy, zz, xy, yz, xz. `None` for rigid bodies and for the
+    /// linear law, which has none that turns with the elements.
+    pub fn cauchy_stress(&mut self, body: usize) -> Option<Vec<[f64; 6]>> {
+        self.dynamics.cauchy_stress(body)
+    }
+
     /// Energy of the deformable bodies.
     pub fn energy(&mut self) -> Energy {
         self.dynamics.energy()

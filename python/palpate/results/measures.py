@@ -13,6 +13,20 @@ def signed_volumes(nodes: Float64Array, tetrahedra: IndexArray) -> Float64Array:
     return np.asarray(np.einsum("mi,mi->m", np.cross(edges[:, 0], edges[:, 1]), edges[:, 2]) / 6)
 
 
+def von_mises(stress: Float64Array) -> Float64Array:
+    """Von Mises stress (m,) of Cauchy stresses xx, yy, zz, xy, yz, xz of shape (m, 6)."""
+    xx, yy, zz, xy, yz, xz = stress.T
+    axial = (xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2
+    return np.asarray(np.sqrt(0.5 * axial + 3 * (xy**2 + yz**2 + xz**2)))
+
+
+def node_means(values: Float64Array, tetrahedra: IndexArray, count: int) -> Float64Array:
+    """Mean of tetrahedra's values (m,) around each of ``count`` nodes; 0 where there are none."""
+    corners = tetrahedra.ravel()
+    sums = np.bincount(corners, np.repeat(values, 4), minlength=count)
+    return np.asarray(sums / np.maximum(np.bincount(corners, minlength=count), 1))
+
+
 def mean_ratios(nodes: Float64Array, tetrahedra: IndexArray) -> Float64Array:
     """Shape of each tetrahedron, shape (m,): 1 regular, 0 flat, negative inside out.
 

@@ -16,6 +16,7 @@ from palpate.cutting import Blade
 from palpate.model import Body, Model
 from palpate.results.drawing import looks_of, upward
 from palpate.results.frames import contact_depths
+from palpate.results.measures import node_means, von_mises
 from palpate.simulation import Simulation, Snapshot, StepReport
 from palpate.viewer.editing import edited, settings_of, transferred
 from palpate.viewer.hands import Hands
@@ -25,7 +26,7 @@ from palpate.viewer.surface import Strain, Surfaces, deformation
 
 #: Seconds between two counts of the tested triangle pairs while nobody looks at them closely.
 _COUNT_INTERVAL = 0.5
-_FIELDS = ("displacement", "deformation", "strain", "depth", "force")
+_FIELDS = ("displacement", "deformation", "strain", "stress", "depth", "force")
 #: States before a cut that are kept at most.
 _UNDO = 16
 
@@ -266,9 +267,20 @@ class LivePlayer(Player):
             return [np.linalg.norm(each, axis=1) for each in self._simulation.contact_forces]
         if name == "strain":
             return [strain.of(now) for strain, now in zip(self._strains(), positions, strict=True)]
+        if name == "stress":
+            return [self._stress(index) for index in range(len(positions))]
         offsets = np.concatenate([[0], np.cumsum([len(each) for each in positions])])
         depths = contact_depths(self._simulation, offsets)
         return [depths[start:end] for start, end in pairwise(offsets)]
+
+    def _stress(self, index: int) -> Float64Array:
+        """Von Mises stress around each node; 0 for bodies that have none."""
+        mesh = self._simulation.model.bodies[index].mesh
+        try:
+            stress = von_mises(self._simulation.stress(index))
+        except ValueError:
+            return np.zeros(len(mesh.nodes))
+        return node_means(stress, mesh.tetrahedra, len(mesh.nodes))
 
     def _strains(self) -> list[Strain]:
         if self._strain_version != self._version:

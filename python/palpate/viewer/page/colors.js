@@ -34,6 +34,7 @@ export const FIELDS = {
   displacement: { name: "Displacement", unit: "m", least: 1e-4 },
   deformation: { name: "Deformation", unit: "m", least: 1e-4, note: "off the best rigid motion" },
   strain: { name: "Strain", unit: "", least: 1e-3, note: "equivalent strain, the mean around each node" },
+  stress: { name: "Stress", unit: "Pa", least: 1, note: "von Mises, the mean around each node; laws other than linear" },
   depth: { name: "Penetration depth", unit: "m", least: 1e-5 },
   force: { name: "Contact force", unit: "N", least: 1e-6 },
 };
