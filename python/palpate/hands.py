@@ -14,6 +14,8 @@ from palpate._arrays import Float64Array
 # How far the columns of a rotation matrix may be off right angles and length 1.
 _ROTATION_TOLERANCE = 1e-6
 
+_RELEASED = "this was released before, or belongs to another state"
+
 
 class _State(NamedTuple):
     body: int
@@ -35,15 +37,15 @@ class Pull:
         self._id = identity
 
     def _state(self) -> _State:
-        pulls = self._core.pulls()
-        if self._id not in pulls:
-            raise ValueError("this was released before, or belongs to another state")
-        return _State(*pulls[self._id])
+        state = self._core.pulled(self._id)
+        if state is None:
+            raise ValueError(_RELEASED)
+        return _State(*state)
 
     @property
     def is_active(self) -> bool:
         """Whether it still pulls."""
-        return self._id in self._core.pulls()
+        return self._core.pulled(self._id) is not None
 
     @property
     def body(self) -> int:
@@ -110,7 +112,7 @@ class Drive:
     def _state(self) -> tuple[int, npt.NDArray[np.int32], Float64Array, Float64Array]:
         state = self._core.driven(self._id)
         if state is None:
-            raise ValueError("this was released before, or belongs to another state")
+            raise ValueError(_RELEASED)
         return state
 
     @property

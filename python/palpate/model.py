@@ -209,7 +209,7 @@ class Model:
         attachments: Iterable[Attachment] = (),
     ) -> None:
         items = [bodies] if isinstance(bodies, (Body, Mesh)) else list(bodies)
-        cores = []
+        cores, names = [], []
         for index, item in enumerate(items):
             if isinstance(item, Mesh):
                 item = Body(item, name=f"body_{index + 1}")
@@ -219,7 +219,7 @@ class Model:
                     f"got {type(item).__name__}"
                 )
             cores.append(item._to_core())
-        names = [core.name for core in _core.Model(cores, (0.0, 0.0, 0.0), []).bodies]
+            names.append(str(item.name))
         ties = []
         for index, each in enumerate(attachments):
             if not isinstance(each, Attachment):

@@ -39,7 +39,7 @@ pub(crate) struct MovingBody {
     pub(crate) next_velocities: Vec<Point>,
     pub(crate) motion: Motion,
     pub(crate) compliance: ComplianceCache,
-    /// Half solutions made in this step.
+    /// Nodes whose half solutions were made in this step.
     pub(crate) new_columns: usize,
     /// Whether contact forces act in this step.
     pub(crate) touched: bool,
@@ -206,13 +206,6 @@ impl MovingBody {
                     &mut self.next_positions,
                     &mut self.next_velocities,
                 );
-                elastic.find_driven_forces(
-                    &self.velocities,
-                    &self.forces,
-                    &self.contact_forces,
-                    &self.next_positions,
-                    &self.next_velocities,
-                );
             }
             BodyKind::Rigid(_) => {
                 self.next_positions.copy_from_slice(&self.expected_positions);
@@ -285,7 +278,17 @@ impl MovingBody {
         }
     }
 
+    /// Takes over the state after the step; only then is it known what moved the driven nodes.
     pub(crate) fn commit(&mut self) {
+        if let BodyKind::Elastic(elastic) = &mut self.kind {
+            elastic.find_driven_forces(
+                &self.velocities,
+                &self.forces,
+                &self.contact_forces,
+                &self.next_positions,
+                &self.next_velocities,
+            );
+        }
         std::mem::swap(&mut self.positions, &mut self.next_positions);
         std::mem::swap(&mut self.velocities, &mut self.next_velocities);
         self.refactored = match &mut self.kind {

@@ -58,7 +58,7 @@ pub struct StageTimes {
     pub predict: Duration,
     /// Which pairs are contacts.
     pub filter: Duration,
-    /// Compliance columns that were not known yet.
+    /// Compliance of nodes for which it was not known yet.
     pub compliance: Duration,
     /// The contact forces.
     pub solve: Duration,
@@ -88,7 +88,7 @@ pub struct StepStats {
     pub refactored: usize,
     /// Largest error of a gap or slip that the last solve left, in contact distances.
     pub residual: f64,
-    /// Compliance columns that had to be solved.
+    /// Nodes whose compliance had to be solved for.
     pub new_columns: usize,
     /// Where the time went.
     pub times: StageTimes,
@@ -247,16 +247,16 @@ impl Dynamics {
         }
     }
 
-    /// Solves ahead for the response of each body to contact, up to `columns` surface nodes per body;
+    /// Solves ahead for the response of each body to contact, up to `nodes` surface nodes per body;
     /// returns for how many it was. Zero means that there is nothing left to do, or no memory for it.
     ///
     /// The first contact of a node costs a solve otherwise: many at once make a slow step. The results
-    /// are the same bits either way. Call it before the first step, or with a few columns whenever
+    /// are the same bits either way. Call it before the first step, or with a few nodes whenever
     /// there is time.
-    pub fn prepare_contact(&mut self, columns: usize) -> usize {
+    pub fn prepare_contact(&mut self, nodes: usize) -> usize {
         let solved = AtomicUsize::new(0);
         self.for_each_body(|_, body| {
-            solved.fetch_add(body.prepare_ahead(columns), Ordering::Relaxed);
+            solved.fetch_add(body.prepare_ahead(nodes), Ordering::Relaxed);
         });
         solved.into_inner()
     }

@@ -1,6 +1,5 @@
 //! `palpate._core.Simulation`: the step loop, its state and its checkpoints.
 
-use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -226,10 +225,12 @@ impl PySimulation {
         raise(py, self.lock().release(pull))
     }
 
-    /// Body, node, target, stiffness and force of each spring by what it is called by.
-    fn pulls(&self) -> BTreeMap<u64, (u32, u32, Vec3, f64, Vec3)> {
-        let row = |p: &Pull| (p.id, (p.body, p.node, p.target.into(), p.stiffness, p.force.into()));
-        self.lock().pulls().iter().map(row).collect()
+    /// Body, node, target, stiffness and force of a spring; `None` if it is gone.
+    fn pulled(&self, pull: u64) -> Option<(u32, u32, Vec3, f64, Vec3)> {
+        let guard = self.lock();
+        let found = guard.pulls().iter().find(|each| each.id == pull)?;
+        let Pull { body, node, target, stiffness, force, .. } = *found;
+        Some((body, node, target.into(), stiffness, force.into()))
     }
 
     fn drive(

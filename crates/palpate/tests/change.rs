@@ -1,38 +1,23 @@
 //! Cuts, removal and separation while a simulation runs.
 
+#[path = "support/boxes.rs"]
+mod boxes;
+
 use std::sync::Arc;
 
+use boxes::box_data;
 use palpate::cutting::{Blade, CutOptions};
 use palpate::model::{Body, Law, RigidMotion, write_model};
 use palpate::{
     CoreLoader, Mesh, MeshData, Model, Simulation, SimulationError, SimulationOptions, load_model,
 };
 
-/// A box of `cells` cubic cells with edge `h` [m], six tetrahedra each.
+/// A box whose layers of cells along x are regions 1 and 0 by turns.
 fn soft_box(cells: [usize; 3], h: f64, origin: [f64; 3]) -> Arc<Mesh> {
-    let [nx, ny, nz] = cells;
-    let number = |i: usize, j: usize, k: usize| ((i * (ny + 1) + j) * (nz + 1) + k) as u32;
-    let mut data = MeshData::default();
-    for i in 0..=nx {
-        for j in 0..=ny {
-            for k in 0..=nz {
-                let at = [i, j, k].map(|index| index as f64 * h);
-                data.nodes.push(std::array::from_fn(|axis| origin[axis] + at[axis]));
-            }
-        }
-    }
-    let paths = [[1, 3], [3, 2], [2, 6], [6, 4], [4, 5], [5, 1]];
-    for i in 0..nx {
-        for j in 0..ny {
-            for k in 0..nz {
-                let corner = |c: usize| number(i + (c & 1), j + (c >> 1 & 1), k + (c >> 2));
-                for [a, b] in paths {
-                    data.tetrahedra.push([corner(0), corner(a), corner(b), corner(7)]);
-                    data.regions.push(i32::from(i % 2 == 0));
-                }
-            }
-        }
-    }
+    let [_, ny, nz] = cells;
+    let mut data = box_data(cells, h, origin);
+    let layer = |tetrahedron: usize| tetrahedron / (6 * ny * nz);
+    data.regions = (0..data.tetrahedra.len()).map(|t| i32::from(layer(t) % 2 == 0)).collect();
     data.node_sets.insert("low".into(), (0..data.nodes.len() as u32).step_by(nz + 1).collect());
     Arc::new(Mesh::repaired(data).expect("a box is a mesh").0)
 }

@@ -1,35 +1,25 @@
 //! Nodes that are moved along a path.
 
+#[path = "support/boxes.rs"]
+mod boxes;
+
 use std::sync::Arc;
 
+use boxes::box_data;
 use palpate::{Simulation, SimulationOptions};
 use palpate_geometry::Point;
-use palpate_model::{Body, Law, Material, Mesh, MeshData, Model};
+use palpate_model::{Body, Law, Material, Mesh, Model};
 
-/// A bar of `n` cells of 1 cm along x, six tetrahedra each.
-fn bar(n: u32) -> Arc<Mesh> {
-    let mut data = MeshData::default();
-    for i in 0..=n {
-        for (y, z) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
-            data.nodes.push([i, y, z].map(|k| 0.01 * f64::from(k)));
-        }
-    }
-    for i in 0..n {
-        let corner = |bits: u32| 4 * (i + (bits & 1)) + (bits >> 1);
-        for path in [[1, 3], [3, 2], [2, 6], [6, 4], [4, 5], [5, 1]] {
-            data.tetrahedra.push([0, path[0], path[1], 7].map(corner));
-        }
-    }
-    Arc::new(Mesh::new(data).expect("a valid bar"))
-}
-
+/// Of 1 cm along x.
 const CELLS: u32 = 8;
 const YOUNG: f64 = 1e4;
 
 /// The bar, held at x = 0, without gravity.
 fn held_bar(law: Law, damping: f64) -> Model {
     let material = Material { law, young: YOUNG, poisson: 0.0, damping, ..Material::default() };
-    let body = Body { material, fixed_nodes: vec![0, 1, 2, 3], ..Body::new("bar", bar(CELLS)) };
+    let data = box_data([CELLS as usize, 1, 1], 0.01, [0.0; 3]);
+    let mesh = Arc::new(Mesh::repaired(data).expect("a valid bar").0);
+    let body = Body { material, fixed_nodes: vec![0, 1, 2, 3], ..Body::new("bar", mesh) };
     Model { gravity: [0.0; 3], ..Model::from_bodies(vec![body]) }
 }
 

@@ -1,35 +1,16 @@
 //! The step loop as a whole: bits, state and checkpoints.
 
+#[path = "support/boxes.rs"]
+mod boxes;
+
 use std::sync::Arc;
 
+use boxes::box_data;
 use palpate::model::{Body, RigidMotion};
 use palpate::{CheckpointError, Mesh, MeshData, Model, Simulation, SimulationOptions};
 
-/// A box of `cells` cubic cells with edge `h` [m], six tetrahedra each.
 fn soft_box(cells: [usize; 3], h: f64, origin: [f64; 3]) -> Mesh {
-    let [nx, ny, nz] = cells;
-    let number = |i: usize, j: usize, k: usize| ((i * (ny + 1) + j) * (nz + 1) + k) as u32;
-    let mut data = MeshData::default();
-    for i in 0..=nx {
-        for j in 0..=ny {
-            for k in 0..=nz {
-                let at = [i, j, k].map(|index| index as f64 * h);
-                data.nodes.push(std::array::from_fn(|axis| origin[axis] + at[axis]));
-            }
-        }
-    }
-    let paths = [[1, 3], [3, 2], [2, 6], [6, 4], [4, 5], [5, 1]];
-    for i in 0..nx {
-        for j in 0..ny {
-            for k in 0..nz {
-                let corner = |c: usize| number(i + (c & 1), j + (c >> 1 & 1), k + (c >> 2));
-                for [a, b] in paths {
-                    data.tetrahedra.push([corner(0), corner(a), corner(b), corner(7)]);
-                }
-            }
-        }
-    }
-    Mesh::repaired(data).expect("a box is a mesh").0
+    Mesh::repaired(box_data(cells, h, origin)).expect("a box is a mesh").0
 }
 
 fn falling_boxes() -> Model {

@@ -19,7 +19,6 @@ from typing import Any
 
 import numpy as np
 
-from palpate._arrays import Float64Array
 from palpate.bench.output import (
     markdown_table,
     milliseconds,
@@ -29,8 +28,8 @@ from palpate.bench.output import (
     write_text,
 )
 from palpate.bench.refine import refine
-from palpate.mesh import Mesh
 from palpate.model import Material, Model, read_model
+from palpate.results.measures import mean_edge, signed_volumes
 from palpate.simulation import Simulation
 
 #: Frames of landing, until all is at rest, and of each of the other situations.
@@ -165,9 +164,14 @@ def measure(name: str, model: Model, law: str, threads: int, frames: Sequence[in
         situations.append(play("pulled", pulled, lead))
     factors = sum(simulation.factor_bytes)
     speed = max(float(np.abs(simulation.velocities[index]).max()) for index in soft)
-    edges = [_mean_edge(model.bodies[index].mesh) for index in soft]
+    edges = [mean_edge(model.bodies[index].mesh) for index in soft]
     inverted = sum(
-        int((_volumes(simulation.positions[index], model.bodies[index].mesh.tetrahedra) <= 0).sum())
+        int(
+            (
+                signed_volumes(simulation.positions[index], model.bodies[index].mesh.tetrahedra)
+                <= 0
+            ).sum()
+        )
         for index in soft
     )
     return Outcome(
@@ -187,17 +191,6 @@ def measure(name: str, model: Model, law: str, threads: int, frames: Sequence[in
         mean_edge=min(edges),
         speed_at_end=speed,
     )
-
-
-def _mean_edge(mesh: Mesh) -> float:
-    ends = mesh.nodes[mesh.triangles]
-    return float(np.linalg.norm(ends - np.roll(ends, 1, axis=1), axis=2).mean())
-
-
-def _volumes(nodes: Float64Array, tetrahedra: Any) -> Float64Array:
-    corners = nodes[tetrahedra]
-    volumes: Float64Array = np.linalg.det(corners[:, 1:] - corners[:, :1]) / 6
-    return volumes
 
 
 def run(

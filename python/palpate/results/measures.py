@@ -5,12 +5,19 @@ from __future__ import annotations
 import numpy as np
 
 from palpate._arrays import Float64Array, IndexArray
+from palpate.mesh import Mesh
 
 
 def signed_volumes(nodes: Float64Array, tetrahedra: IndexArray) -> Float64Array:
     """Volume [m³] of each tetrahedron, shape (m,); negative when it is turned inside out."""
     edges = nodes[tetrahedra[:, 1:]] - nodes[tetrahedra[:, :1]]
     return np.asarray(np.einsum("mi,mi->m", np.cross(edges[:, 0], edges[:, 1]), edges[:, 2]) / 6)
+
+
+def mean_edge(mesh: Mesh) -> float:
+    """Mean length [m] of the surface edges at rest."""
+    a, b = (mesh.nodes[end] for end in mesh.surface_edges.T)
+    return float(np.linalg.norm(b - a, axis=1).mean())
 
 
 def von_mises(stress: Float64Array) -> Float64Array:

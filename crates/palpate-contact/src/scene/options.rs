@@ -49,8 +49,8 @@ pub struct ProximityOptions {
     pub close_at_rest: bool,
     /// Each pair of closest features only once: edges only where both closest points lie between their
     /// ends, since nodes and triangles tell the rest, and a node against an edge or node of a surface
-    /// only with the first of the triangles that share it. A tenth of all pairs at a distance of a few
-    /// edges: what contact is made of.
+    /// only with the first of the triangles that share it. Contact is made of these; at a distance of a
+    /// few edges most pairs are others.
     pub each_feature_once: bool,
 }
 

@@ -112,19 +112,13 @@ impl Dynamics {
     /// # Errors
     /// If there are no nodes, or one of them does not exist or is driven already.
     pub fn check_drive(&self, body: usize, nodes: &[u32]) -> Result<(), MechanicsError> {
-        let count = self.body_count();
-        if body >= count {
-            return Err(MechanicsError::NoSuchBody { index: body, count });
-        }
+        self.check_body(body)?;
         if self.body(body).elastic().is_none() {
             return Err(MechanicsError::RigidDriven(body));
         }
-        let node_count = self.positions(body).len();
         for &node in nodes {
             let node = node as usize;
-            if node >= node_count {
-                return Err(MechanicsError::NoSuchNode { body, node, nodes: node_count });
-            }
+            self.check_node(body, node)?;
             let driven = self.drives.all.iter().filter(|drive| drive.body as usize == body);
             if driven.flat_map(|drive| &drive.nodes).any(|&other| other as usize == node) {
                 return Err(MechanicsError::DrivenTwice { body, node });
@@ -172,7 +166,8 @@ impl Dynamics {
     pub(super) fn apply_drives(&mut self, body: usize) {
         let drives = std::mem::take(&mut self.drives);
         let own = drives.all.iter().filter(|drive| drive.body as usize == body);
-        let targets = own.flat_map(|drive| drive.nodes.iter().copied().zip(drive.targets.clone()));
+        let targets =
+            own.flat_map(|drive| drive.nodes.iter().copied().zip(drive.targets.iter().copied()));
         if let BodyKind::Elastic(elastic) = &mut self.body_mut(body).kind {
             elastic.set_driven(targets);
         }

@@ -35,14 +35,8 @@ impl Dynamics {
         target: Point,
         stiffness: f64,
     ) -> Result<(), MechanicsError> {
-        let count = self.body_count();
-        if body >= count {
-            return Err(MechanicsError::NoSuchBody { index: body, count });
-        }
-        let nodes = self.positions(body).len();
-        if node >= nodes {
-            return Err(MechanicsError::NoSuchNode { body, node, nodes });
-        }
+        self.check_body(body)?;
+        self.check_node(body, node)?;
         if !self.body(body).elastic().is_some_and(|elastic| elastic.is_free(node)) {
             return Err(MechanicsError::CannotMove { body, node });
         }
@@ -126,11 +120,18 @@ impl Dynamics {
         Ok([force.to_array(), torque.to_array()])
     }
 
-    fn rigid(&self, body: usize) -> Result<&RigidBody, MechanicsError> {
+    pub(super) fn check_body(&self, index: usize) -> Result<(), MechanicsError> {
         let count = self.body_count();
-        if body >= count {
-            return Err(MechanicsError::NoSuchBody { index: body, count });
-        }
+        if index < count { Ok(()) } else { Err(MechanicsError::NoSuchBody { index, count }) }
+    }
+
+    pub(super) fn check_node(&self, body: usize, node: usize) -> Result<(), MechanicsError> {
+        let nodes = self.positions(body).len();
+        if node < nodes { Ok(()) } else { Err(MechanicsError::NoSuchNode { body, node, nodes }) }
+    }
+
+    fn rigid(&self, body: usize) -> Result<&RigidBody, MechanicsError> {
+        self.check_body(body)?;
         self.body(body).rigid().ok_or(MechanicsError::NotRigid(body))
     }
 

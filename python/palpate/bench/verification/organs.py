@@ -9,17 +9,11 @@ from pathlib import Path
 import numpy as np
 
 from palpate._arrays import Float64Array
-from palpate.bench.verification.shapes import volumes
 from palpate.files import read_mesh
 from palpate.mesh import Mesh
 from palpate.model import Body, Contact, Material, Model, RigidKey, read_model
+from palpate.results.measures import mean_edge, signed_volumes
 from palpate.simulation import Simulation
-
-
-def mean_edge(mesh: Mesh) -> float:
-    """Mean length [m] of the surface edges at rest."""
-    a, b = (mesh.nodes[end] for end in mesh.surface_edges.T)
-    return float(np.linalg.norm(b - a, axis=1).mean())
 
 
 def plate(half: float, height: float, *, down: bool = False) -> Mesh:
@@ -96,7 +90,7 @@ def squeeze(
                 simulation.time,
                 (above[0, 2] - below[0, 2]) / thickness,
                 misfit(organ, x),
-                (volumes(x, organ.tetrahedra) <= 0).sum(),
+                (signed_volumes(x, organ.tetrahedra) <= 0).sum(),
             )
         )
     times, gaps, misfits, inverted = np.array(rows).T
@@ -152,7 +146,7 @@ def heap(
         report = simulation.step()
         seconds += report.times["total"]
         each = [
-            volumes(x, mesh.tetrahedra)
+            signed_volumes(x, mesh.tetrahedra)
             for x, mesh in zip(simulation.positions, placed, strict=False)
         ]
         speeds = [np.linalg.norm(v, axis=1).max() for v in simulation.velocities[:-1]]

@@ -6,8 +6,9 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from palpate._arrays import Float64Array, IndexArray
+from palpate._arrays import Float64Array
 from palpate.mesh import Mesh
+from palpate.results.measures import signed_volumes
 
 #: Corners of the six tetrahedra of a cell: bit 0 steps along x, bit 1 along y, bit 2 along z.
 _PATHS = ((0, 1, 3, 7), (0, 3, 2, 7), (0, 2, 6, 7), (0, 6, 4, 7), (0, 4, 5, 7), (0, 5, 1, 7))
@@ -67,15 +68,9 @@ def graded(fine: float, cells: int, growth: float, end: float) -> Float64Array:
     return np.concatenate([[0.0], np.cumsum(steps)])
 
 
-def volumes(nodes: Float64Array, tetrahedra: IndexArray) -> Float64Array:
-    """Volume [m³] of each tetrahedron; negative when inverted."""
-    a, b, c, d = (nodes[corner] for corner in tetrahedra.T)
-    return np.asarray(np.einsum("ij,ij->i", b - a, np.cross(c - a, d - a)) / 6.0)
-
-
 def masses(mesh: Mesh, density: float = 1000.0) -> Float64Array:
     """Lumped masses [kg] of the nodes: a quarter of each tetrahedron around them."""
-    quarter = density * volumes(mesh.nodes, mesh.tetrahedra) / 4.0
+    quarter = density * signed_volumes(mesh.nodes, mesh.tetrahedra) / 4.0
     corners = mesh.tetrahedra.ravel()
     sums = np.bincount(corners, np.repeat(quarter, 4), minlength=len(mesh.nodes))
     return sums.astype(np.float64)
@@ -134,7 +129,7 @@ RULE_POINTS, RULE_WEIGHTS = _rule()
 
 def body_loads(mesh: Mesh, force: Field) -> Float64Array:
     """Consistent nodal forces [N] of a force density [N/m³] given at rest positions."""
-    volume = volumes(mesh.nodes, mesh.tetrahedra)
+    volume = signed_volumes(mesh.nodes, mesh.tetrahedra)
     corners = mesh.nodes[mesh.tetrahedra]
     loads = np.zeros_like(mesh.nodes)
     for place, weight in zip(RULE_POINTS, RULE_WEIGHTS, strict=True):
@@ -146,7 +141,7 @@ def body_loads(mesh: Mesh, force: Field) -> Float64Array:
 
 def l2_distance(mesh: Mesh, values: Float64Array, exact: Field) -> float:
     """L2 norm over the mesh of nodal values, interpolated, less an exact function of place."""
-    volume = volumes(mesh.nodes, mesh.tetrahedra)
+    volume = signed_volumes(mesh.nodes, mesh.tetrahedra)
     total = 0.0
     for place, weight in zip(RULE_POINTS, RULE_WEIGHTS, strict=True):
         at = np.einsum("c,mcd->md", place, mesh.nodes[mesh.tetrahedra])

@@ -13,8 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from palpate.bench.verification.organs import mean_edge
-from palpate.bench.verification.shapes import volumes
+from palpate.results.measures import mean_edge, signed_volumes
 from palpate.simulation import Simulation
 
 #: A node deeper than this part of the mean edge inside another body, for as many steps, is stuck.
@@ -61,7 +60,7 @@ def soak(minutes: float, seed: int) -> list[str]:
                     settled = memory()
                 if steps % 500 == 0:
                     inverted = sum(
-                        int((volumes(x, each.mesh.tetrahedra) <= 0).sum())
+                        int((signed_volumes(x, each.mesh.tetrahedra) <= 0).sum())
                         for x, each in zip(simulation.positions, bodies, strict=False)
                     )
                     print(
