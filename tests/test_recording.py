@@ -167,6 +167,16 @@ def test_a_film_holds_the_frames(finished, by_hand, tmp_path):
     assert not re.search(r"(src|href)=\"(?!data:)", page)
     assert '"./' not in page
     (hello, _), _, *rest = messages_of(page)
+    assert hello["fields"] == ["displacement", "stress", "depth", "force"]
+    viewer = NullViewer(lambda: RecordedPlayer(Recording(finished)))
+    for number, (header, arrays) in enumerate(rest):
+        viewer.send({"type": "seek", "frame": number})
+        for field in ("stress", "depth", "force"):
+            viewer.send({"type": "show", "field": field, "contacts": False, "touching": False})
+            values = viewer.arrays("frame")[f"field/{field}"]
+            high = header["quantised"]["high"][field]
+            assert high == pytest.approx(values.max())
+            assert np.allclose(arrays[f"field/{field}"] / 255 * high, values, atol=high / 500)
     assert (hello["mode"], len(hello["times"])) == ("recording", 5)
     surfaces = Surfaces([body.mesh for body in simulation.model.bodies])
     ends = np.cumsum([0, *surfaces.node_counts])

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import palpate
-from palpate.results.measures import node_means, von_mises
+from palpate.results.measures import node_means
+from palpate.results.stress import VonMises, von_mises
 
 
 @pytest.fixture
@@ -233,6 +234,24 @@ def test_stress_is_that_of_the_load_it_carries(make_box):
     assert np.allclose(stress, np.tile(expected, (len(box.tetrahedra), 1)), atol=2e-2)
     assert np.allclose(von_mises(stress), 10.0, atol=2e-2)
     assert np.allclose(node_means(von_mises(stress), box.tetrahedra, len(box.nodes)), 10, atol=2e-2)
+
+
+@pytest.mark.parametrize("regions", [{}, {1: palpate.Material(young=3e4, poisson=0.3)}])
+def test_linear_bodies_have_hookes_stress_without_the_turn(make_box, regions):
+    box = make_box((2, 2, 2), size=0.1)
+    half = (np.arange(len(box.tetrahedra)) % 2).astype(np.int32)
+    mesh = palpate.Mesh(box.nodes, tetrahedra=box.tetrahedra, regions=half)
+    body = palpate.Body(mesh, material=palpate.Material(young=1e4, poisson=0.3), regions=regions)
+    simulation = palpate.Simulation(palpate.Model([body], gravity=(0, 0, 0)))
+    angle = 0.8
+    turn = np.array(
+        [[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]]
+    )
+    stretched = mesh.nodes * (1 + 1e-3 * np.array([1, -0.3, -0.3]))
+    simulation.set_positions(0, stretched @ turn.T)
+    # Uniaxial stress: Young's modulus times the stretch.
+    young = np.where(half == 1, 3e4 if regions else 1e4, 1e4)
+    assert np.allclose(VonMises(simulation).of(0), 1e-3 * young, rtol=3e-3)
 
 
 def test_bodies_without_stress_are_named(falling):

@@ -18,12 +18,14 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
 import palpate
+from palpate.results.stress import Strain
 from palpate.viewer import NullViewer, Viewer, ViewerError
+from palpate.viewer.grip import patch
 from palpate.viewer.live import LivePlayer
 from palpate.viewer.page import page_files
 from palpate.viewer.probe import aim, probe_mesh
 from palpate.viewer.protocol import PROTOCOL, ProtocolError, decode, encode, parse_command
-from palpate.viewer.surface import Strain, Surfaces, deformation
+from palpate.viewer.surface import Surfaces, deformation
 
 _JSON = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=8),
@@ -145,12 +147,14 @@ def test_deformation_does_not_see_rigid_motion(make_box):
 
 def test_strain_of_a_stretch(make_box):
     mesh = make_box((2, 3, 2))
-    strain = Strain(mesh)
+    strain = Strain(mesh, seen=True)
     turn = np.linalg.qr(np.random.default_rng(2).normal(size=(3, 3)))[0]
     turn *= np.sign(np.linalg.det(turn))
-    assert np.allclose(strain.of(mesh.nodes @ turn.T + 7), 0, atol=1e-6)
-    assert np.allclose(strain.of(2 * mesh.nodes), 0, atol=1e-6)  # it changes volume, not shape
-    stretched = strain.of((mesh.nodes * (1.2, 1, 1)) @ turn.T)
+    assert np.allclose(strain.at_nodes(mesh.nodes @ turn.T + 7), 0, atol=1e-6)
+    assert np.allclose(
+        strain.at_nodes(2 * mesh.nodes), 0, atol=1e-6
+    )  # it changes volume, not shape
+    stretched = strain.at_nodes((mesh.nodes * (1.2, 1, 1)) @ turn.T)
     assert np.allclose(stretched, 2 / 3 * (1.2**2 - 1) / 2)
     # A shear of random nodes: the plain formula, node by node.
     nodes = mesh.nodes + np.random.default_rng(3).normal(scale=0.05, size=mesh.nodes.shape)
@@ -164,8 +168,9 @@ def test_strain_of_a_stretch(make_box):
     mean = [
         np.mean(np.array(values)[(mesh.tetrahedra == k).any(axis=1)]) for k in mesh.surface_nodes
     ]
-    assert np.allclose(strain.of(nodes)[mesh.surface_nodes], mean, rtol=1e-4)
-    assert not Strain(palpate.Mesh(mesh.nodes, triangles=mesh.triangles)).of(mesh.nodes * 2).any()
+    assert np.allclose(strain.at_nodes(nodes)[mesh.surface_nodes], mean, rtol=1e-4)
+    surface = Strain(palpate.Mesh(mesh.nodes, triangles=mesh.triangles), seen=True)
+    assert not surface.at_nodes(mesh.nodes * 2).any()
 
 
 def test_the_probe_is_closed_and_points_where_it_aims():
@@ -323,7 +328,7 @@ def test_pages_get_what_any_of_them_wants(viewer):
     assert {"field/deformation", "contact_points", "touching"} <= set(arrays)
     assert len(arrays["contact_points"]) == len(arrays["contact_forces"]) > 10
     viewer.send({"type": "show", "field": "depth", "contacts": False, "touching": False}, client=2)
-    for field in ("displacement", "deformation", "strain", "force"):
+    for field in ("displacement", "deformation", "strain", "stress", "force"):
         viewer.send({**show, "field": field})
         values = viewer.arrays("frame")[f"field/{field}"]
         assert len(values) == len(arrays["positions"])
@@ -333,6 +338,30 @@ def test_pages_get_what_any_of_them_wants(viewer):
     viewer.leave(1)
     viewer.send({"type": "step", "count": 1}, client=2)
     assert list(viewer.arrays("frame")) == ["positions"]
+
+
+def test_boxes_of_a_tree_level_hold_the_bodies(viewer):
+    viewer.send({"type": "step", "count": 20})
+    show = {"type": "show", "field": None, "contacts": False, "touching": False}
+    viewer.send({**show, "level": 0}, client=1)
+    viewer.send({**show, "level": 5}, client=2)
+    frame, scene = viewer.arrays("frame"), viewer.arrays("scene")
+    counts = frame["box_counts/5"]
+    assert list(frame["box_counts/0"]) == [1] * 4
+    assert len(frame["boxes/5"]) == counts.sum()
+    assert counts.min() > 8
+    ends = np.cumsum([len(scene[f"rest/{i}"]) for i in range(4)])
+    for points, whole, boxes in zip(
+        np.split(frame["positions"], ends[:-1]),
+        frame["boxes/0"],
+        np.split(frame["boxes/5"], np.cumsum(counts)[:-1]),
+        strict=True,
+    ):
+        assert np.array_equal(whole, [*points.min(axis=0), *points.max(axis=0)])
+        low, high = boxes[:, None, :3], boxes[:, None, 3:]
+        assert ((points >= low) & (points <= high)).all(axis=2).any(axis=0).all()
+    with pytest.raises(ProtocolError, match="level: expected a whole number from 0 to 16"):
+        viewer.send({**show, "level": 99})
 
 
 def highest(viewer, body):
@@ -371,6 +400,65 @@ def test_tissue_is_pulled_and_let_go(viewer):
     assert "rigid" in viewer.header("notice")["text"]
     viewer.send({**grab, "node": 10**6, "target": [0, 0, 0]})
     assert "no node" in viewer.header("notice")["text"]
+
+
+def test_a_hand_holds_the_surface_around_its_node(make_box):
+    mesh = make_box((4, 4, 4), size=0.04)
+    corner = int(np.argmin(mesh.nodes.sum(axis=1)))
+    beside = int(np.argmin(np.linalg.norm(mesh.nodes - [0.01, 0, 0], axis=1)))
+    body = palpate.Body(mesh, fixed_nodes=[beside])
+    nodes, shares = patch(body, mesh.nodes, corner, 0.0)
+    assert (list(nodes), list(shares)) == ([corner], [1.0])
+    nodes, shares = patch(body, mesh.nodes, corner, 0.0201)
+    away = np.linalg.norm(mesh.nodes - mesh.nodes[corner], axis=1)
+    within = np.intersect1d(np.flatnonzero(away < 0.0201), mesh.surface_nodes)
+    assert np.array_equal(np.sort(nodes), np.setdiff1d(within, [beside]))
+    assert nodes[0] == corner
+    assert shares.sum() == pytest.approx(1)
+    assert (np.diff(shares) <= 0).all()
+    assert (shares > 0).all()
+
+
+def test_a_fold_beside_a_hand_stays_free(make_box):
+    near, far = make_box((2, 2, 2), size=0.02), make_box((2, 2, 2), size=0.02, origin=(0.021, 0, 0))
+    mesh = palpate.Mesh(
+        np.concatenate([near.nodes, far.nodes]),
+        tetrahedra=np.concatenate([near.tetrahedra, far.tetrahedra + len(near.nodes)]),
+    )
+    nodes, _ = patch(palpate.Body(mesh), mesh.nodes, near.surface_nodes[-1], 0.015)
+    assert len(nodes) > 1
+    assert nodes.max() < len(near.nodes)
+
+
+def test_a_patch_is_pulled_together_and_what_a_cut_takes_is_let_go(viewer):
+    viewer.send({"type": "step", "count": 20})
+    node, at = highest(viewer, 0)
+    grab = {"type": "grab", "grip": 4, "body": 0, "node": node, "strength": 1.0}
+    forces = []
+    for radius in (None, 0.015):
+        viewer.send({**grab, "radius": radius, "target": at.tolist()})
+        viewer.send({"type": "drag", "grip": 4, "target": shifted(at, 0.15)})
+        viewer.send({"type": "step", "count": 30})
+        (pull,) = viewer.header("frame")["pulls"]
+        forces.append(pull["force"][2])
+        held = np.array(pull["held"])
+        if radius is None:
+            assert pull["held"] == [pull["from"]]
+            assert pull["from"][2] > at[2] + 0.05
+        viewer.send({"type": "release", "grip": 4})
+        viewer.send({"type": "reset"})
+        viewer.send({"type": "step", "count": 20})
+    assert 3 <= len(held) <= 24
+    assert np.ptp(held, axis=0).max() < 0.035  # no spike
+    assert forces[1] == pytest.approx(forces[0], rel=0.5)
+    # A cut beside the hand leaves it what it can.
+    viewer.send({**grab, "radius": 0.015, "target": at.tolist()})
+    edges = [[[x, at[1] + 0.002, at[2] - 0.006], [x, at[1] + 0.002, 1.0]] for x in (-1.0, 1.0)]
+    viewer.send({"type": "cut", "edges": edges})
+    viewer.send({"type": "step", "count": 3})
+    assert len(viewer.header("frame")["pulls"]) <= 1
+    viewer.send({"type": "release", "grip": 4})
+    assert viewer.header("frame")["pulls"] == []
 
 
 def test_the_probe_presses_where_it_is_led(viewer):

@@ -1,6 +1,7 @@
 """The viewer's page in a headless Chromium; without one, only the tests of `test_viewer.py` run."""
 
 import os
+import re
 import time
 
 import chromium
@@ -107,7 +108,23 @@ def test_what_is_shown_can_be_chosen(page, tmp_path):
         page.key(key)
     page.wait("palpate.last.arrays.contact_points?.length > 30")
     page.wait("palpate.overlay.needles.count > 10 && palpate.overlay.boxes.visible")
-    page.run("palpate.set({ wireframe: false, field: 'deformation' })")
+    assert page.run("palpate.overlay.boxCount") == 4
+    for _ in range(3):
+        page.key("]")
+    page.wait("palpate.last.arrays['boxes/3']?.length > 6 * 4 * 4")
+    page.wait("palpate.overlay.boxCount === palpate.last.arrays['boxes/3'].length / 6")
+    page.wait("/3: [0-9]+ boxes/.test(document.getElementById('panel').textContent)")
+    page.run("document.querySelector('[aria-label=\"Show lower\"]').click(), palpate.set({})")
+    page.wait("palpate.overlay.boxCount < palpate.last.arrays['boxes/3'].length / 6")
+    page.run("document.querySelector('[aria-label=\"Show lower\"]').click()")
+    page.run("palpate.set({ wireframe: false, field: 'stress' })")
+    page.wait("palpate.last.arrays['field/stress'] && palpate.high > 10")
+    assert re.search(
+        "von Mises.*≥ [0-9.]+ k?Pa", page.run("document.getElementById('legend').textContent")
+    )
+    page.run("palpate.set({ range: 0.1 })")
+    page.run("palpate.set({ field: 'deformation' })")
+    assert page.run("palpate.view.range") == 1
     page.wait("!document.getElementById('legend').hidden && palpate.high > 0")
     assert "mm" in page.run("document.getElementById('legend').textContent")
     painted = picture(page, tmp_path / "painted.png")
@@ -246,6 +263,18 @@ def test_a_film_plays_without_a_server(browser, tmp_path):
     page.wait("palpate.last.header.frame === 3")
     page.run("palpate.set({ field: 'displacement' })")
     page.wait("!document.getElementById('legend').hidden")
+    options = page.run("[...document.getElementById('field').options].map((each) => each.value)")
+    assert options == ["", "displacement", "stress", "depth", "force"]
+    wishes = Wishes(frozenset(["stress"]))
+    before = LivePlayer(simulation := palpate.Simulation("small"))
+    simulation.step(3)
+    expected = decode(before.frame(0, wishes, {}))[1]["field/stress"]
+    page.run("palpate.set({ field: 'stress' })")
+    page.wait("/kPa|Pa/.test(document.getElementById('legend').textContent)")
+    shown = page.run(
+        "import('palpate/protocol').then((it) => Array.from(it.valuesOf(palpate.last, 'stress')))"
+    )
+    assert np.allclose(shown, expected, atol=expected.max() / 500)
     assert page.problems == []
     assert all(url.startswith(("file:", "data:", "blob:")) for url in page.requests)
     page.close()

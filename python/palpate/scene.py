@@ -371,6 +371,34 @@ class Scene:
         """
         return self._core.memory()
 
+    def boxes(self, body: int | str, level: int = 0) -> Float64Array:
+        """Boxes at one level of a body's bounding tree, as they are now.
+
+        Parameters
+        ----------
+        body : int or str
+            The body, by index or name.
+        level : int
+            How many splits below the root: 0 is the box of the body. Leaves above the level count
+            to it, so that the boxes of every level hold the whole surface.
+
+        Returns
+        -------
+        (k, 2, 3) float64
+            Low and high corner [m] of each box.
+
+        Examples
+        --------
+        >>> import palpate
+        >>> scene = palpate.Scene("small")
+        >>> scene.boxes("tray").shape
+        (1, 2, 3)
+        >>> len(scene.boxes("tray", level=3))
+        8
+        """
+        level = _arrays.count(level, "level", minimum=0)
+        return self._core.boxes(body_index(self._names, body), level).reshape(-1, 2, 3)
+
     def tree_stats(self, body: int | str) -> dict[str, Any]:
         """Counts of a body's bounding tree: nodes, leaves, depth, how full the leaves are."""
         return self._core.tree_stats(body_index(self._names, body))

@@ -416,6 +416,11 @@ class Simulation:
         pairs, stats = self._core.intersections(bool(self_contact))
         return Intersections(pairs, DetectionStats(*stats))
 
+    def boxes(self, body: int | str, level: int = 0) -> Float64Array:
+        """Boxes (k, 2, 3) [m] at one level of a body's bounding tree; see `Scene.boxes`."""
+        level = _arrays.count(level, "level", minimum=0)
+        return self._core.boxes(self._index(body), level).reshape(-1, 2, 3)
+
     def stress(self, body: int | str) -> Float64Array:
         """Cauchy stress [Pa] of each tetrahedron of a body, without viscosity.
 

@@ -2,6 +2,7 @@
 
 mod build;
 mod change;
+mod level;
 mod refit;
 mod traverse;
 mod validate;

@@ -27,7 +27,7 @@ mod _core {
     #[pymodule_export]
     use crate::scene::PyScene;
     #[pymodule_export]
-    use crate::simulation::{PySimulation, PySnapshot};
+    use crate::simulation::{PySimulation, PySnapshot, von_mises};
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {

@@ -9,7 +9,7 @@ use std::time::Duration;
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2};
 use palpate::contact::{IntersectionOptions, Method, ProximityOptions, Split};
 use palpate::cutting::cut;
-use palpate::geometry::Point;
+use palpate::geometry::{Aabb, Point};
 use palpate::{Scene, SceneOptions};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -264,6 +264,16 @@ impl PyScene {
         Ok(row)
     }
 
+    fn boxes<'py>(
+        &self,
+        py: Python<'py>,
+        body: usize,
+        level: usize,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let boxes = py.detach(|| level_boxes(&self.lock().0, body, level));
+        matrix(py, boxes)
+    }
+
     fn tree_stats<'py>(&self, py: Python<'py>, body: usize) -> PyResult<Bound<'py, PyDict>> {
         let guard = self.lock();
         let tree = guard.0.tree(body);
@@ -280,6 +290,13 @@ impl PyScene {
         row.set_item("leaf_fill", stats.leaf_fill.clone())?;
         Ok(row)
     }
+}
+
+/// Low and high corner of each box at a level of a body's bounding tree.
+pub(crate) fn level_boxes(scene: &Scene, body: usize, level: usize) -> Vec<[f64; 6]> {
+    let boxes = scene.tree(body).level_bounds(level);
+    let row = |Aabb { min: [a, b, c], max: [d, e, f] }: &Aabb| [*a, *b, *c, *d, *e, *f];
+    boxes.iter().map(row).collect()
 }
 
 /// Options from the words that Python uses; the words were checked there already.

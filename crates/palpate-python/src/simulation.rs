@@ -12,11 +12,11 @@ use palpate::{ChangeReport, Simulation, SimulationOptions, Snapshot, StepReport,
 use pyo3::prelude::*;
 use pyo3::types::{IntoPyDict, PyDict, PyTuple};
 
-use crate::arrays::{index, index_matrix, index_vector, matrix, points, vector};
+use crate::arrays::{index, index_matrix, index_vector, matrix, points, rows, vector};
 use crate::cutting::{self, ChangeColumns, Options, PyBlade, change_columns, report_row};
 use crate::errors::raise;
 use crate::model::PyModel;
-use crate::scene::{StatsRow, intersection_rows, scene_options};
+use crate::scene::{StatsRow, intersection_rows, level_boxes, scene_options};
 
 /// A state to come back to.
 #[pyclass(frozen, name = "Snapshot", module = "palpate._core")]
@@ -54,6 +54,16 @@ impl PySimulation {
             .collect::<PyResult<Vec<_>>>()?;
         PyTuple::new(py, arrays)
     }
+}
+
+/// Von Mises stress of rows xx, yy, zz, xy, yz, xz.
+#[pyfunction]
+pub(crate) fn von_mises<'py>(
+    py: Python<'py>,
+    stress: PyReadonlyArray2<'py, f64>,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let stress = rows::<f64, 6>(&stress, "stress")?;
+    Ok(vector(py, stress.iter().map(palpate::mechanics::von_mises).collect()))
 }
 
 type Vec3 = (f64, f64, f64);
@@ -366,6 +376,20 @@ impl PySimulation {
         });
         let (rows, stats) = raise(py, found)?;
         Ok((index_matrix(py, &rows)?, stats))
+    }
+
+    /// Boxes at a level of a body's bounding tree: low and high corner.
+    fn boxes<'py>(
+        &self,
+        py: Python<'py>,
+        body: usize,
+        level: usize,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let boxes = py.detach(|| {
+            let mut guard = self.lock();
+            Ok::<_, palpate::SimulationError>(level_boxes(guard.scene()?, body, level))
+        });
+        matrix(py, raise(py, boxes)?)
     }
 
     /// Cauchy stress of each tetrahedron; `None` where there is none.

@@ -70,7 +70,7 @@ class Run:
         """Step to the end or to Ctrl-C and write everything; returns the report."""
         simulation, options = self._simulation, self._options
         record = Record(simulation)
-        frames = FrameSeries(self._folder, simulation.model)
+        frames = FrameSeries(self._folder, simulation)
         album = Album(simulation.model)
         started, start_time = time.perf_counter(), simulation.time
         frames.add(simulation)

@@ -9,6 +9,7 @@ import numpy as np
 
 from palpate._arrays import Float64Array
 from palpate.model import Model
+from palpate.results.stress import VonMises
 from palpate.results.vtu import Grid, write_series
 from palpate.simulation import Simulation
 
@@ -22,17 +23,18 @@ class FrameSeries:
     Every frame holds all bodies: tetrahedra of soft ones, triangles of surfaces.
     """
 
-    def __init__(self, folder: Path, model: Model) -> None:
+    def __init__(self, folder: Path, simulation: Simulation) -> None:
         self._folder = folder
-        self._set_model(model)
+        self._look_at(simulation)
         self._frames: list[tuple[float, str]] = []
         self._indexed = time.monotonic()
         (folder / "frames").mkdir(parents=True, exist_ok=True)
         for old in [folder / "simulation.pvd", *(folder / "frames").glob("frame_*.vtu")]:
             old.unlink(missing_ok=True)
 
-    def _set_model(self, model: Model) -> None:
-        self._model = model
+    def _look_at(self, simulation: Simulation) -> None:
+        self._model = model = simulation.model
+        self._von_mises = VonMises(simulation)
         self._rest = np.concatenate([body.mesh.nodes for body in model.bodies])
         counts = [len(body.mesh.nodes) for body in model.bodies]
         self._offsets = np.concatenate([[0], np.cumsum(counts)])
@@ -49,7 +51,7 @@ class FrameSeries:
     def add(self, simulation: Simulation) -> None:
         """Write the present state."""
         if simulation.model is not self._model:  # it was cut
-            self._set_model(simulation.model)
+            self._look_at(simulation)
         name = f"frames/frame_{len(self._frames):05d}.vtu"
         points = np.concatenate(simulation.positions)
         data = {
@@ -60,7 +62,16 @@ class FrameSeries:
         }
         with np.errstate(over="ignore"):  # a run that fails gets large first
             shown = {key: values.astype(np.float32) for key, values in data.items()}
-        self._grid.write(self._folder / name, points, shown)
+            stress = np.concatenate(
+                [
+                    self._von_mises.of(index)
+                    if len(body.mesh.tetrahedra)
+                    else np.zeros(len(body.mesh.triangles))
+                    for index, body in enumerate(self._model.bodies)
+                ]
+            )
+            cells = {"von_mises": stress.astype(np.float32)}
+        self._grid.write(self._folder / name, points, shown, cells)
         self._frames.append((simulation.time, name))
         if time.monotonic() - self._indexed > _INDEX_INTERVAL:
             self.finish()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 
 from palpate._arrays import Float64Array, IndexArray
 from palpate.mesh import Mesh
@@ -20,17 +21,10 @@ def mean_edge(mesh: Mesh) -> float:
     return float(np.linalg.norm(b - a, axis=1).mean())
 
 
-def von_mises(stress: Float64Array) -> Float64Array:
-    """Von Mises stress (m,) of Cauchy stresses xx, yy, zz, xy, yz, xz of shape (m, 6)."""
-    xx, yy, zz, xy, yz, xz = stress.T
-    axial = (xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2
-    return np.asarray(np.sqrt(0.5 * axial + 3 * (xy**2 + yz**2 + xz**2)))
-
-
-def node_means(values: Float64Array, tetrahedra: IndexArray, count: int) -> Float64Array:
-    """Mean of tetrahedra's values (m,) around each of ``count`` nodes; 0 where there are none."""
-    corners = tetrahedra.ravel()
-    sums = np.bincount(corners, np.repeat(values, 4), minlength=count)
+def node_means(values: Float64Array, cells: npt.NDArray[np.integer], count: int) -> Float64Array:
+    """Mean of cells' values (m,) around each of ``count`` nodes; 0 where there are none."""
+    corners = cells.ravel()
+    sums = np.bincount(corners, np.repeat(values, cells.shape[1]), minlength=count)
     return np.asarray(sums / np.maximum(np.bincount(corners, minlength=count), 1))
 
 

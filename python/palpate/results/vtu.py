@@ -33,7 +33,7 @@ class Grid:
     cells : sequence of arrays of shape (m, 3) or (m, 4)
         Triangles and tetrahedra.
     cell_data : mapping of str to array, shape (total cells,)
-        Values that do not change.
+        Values that do not change; others come with each frame.
     """
 
     def __init__(
@@ -56,17 +56,26 @@ class Grid:
             "</Cells>",
             "<CellData>",
             *(data_array(name, values) for name, values in cell_data.items()),
-            "</CellData>",
         ]
         self._constant = "\n".join(parts)
 
     def write(
-        self, path: Path, points: npt.NDArray[np.float64], point_data: Mapping[str, _Array]
+        self,
+        path: Path,
+        points: npt.NDArray[np.float64],
+        point_data: Mapping[str, _Array],
+        cell_data: Mapping[str, _Array] | None = None,
     ) -> None:
         """Write one frame, complete or absent; ``points`` [m], shape (n, 3)."""
-        for name, values in {"points": points, **point_data}.items():
-            if len(values) != self._point_count:
-                raise ValueError(f"{name}: expected {self._point_count} rows, got {len(values)}")
+        cell_data = cell_data or {}
+        expected = [
+            (self._point_count, {"points": points, **point_data}),
+            (self._cell_count, cell_data),
+        ]
+        for count, arrays in expected:
+            for name, values in arrays.items():
+                if len(values) != count:
+                    raise ValueError(f"{name}: expected {count} rows, got {len(values)}")
         text = "\n".join(
             [
                 _heading("UnstructuredGrid"),
@@ -76,6 +85,8 @@ class Grid:
                 data_array("Points", points),
                 "</Points>",
                 self._constant,
+                *(data_array(name, values) for name, values in cell_data.items()),
+                "</CellData>",
                 "<PointData>",
                 *(data_array(name, values) for name, values in point_data.items()),
                 "</PointData>",

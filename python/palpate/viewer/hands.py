@@ -6,12 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from palpate._arrays import Float64Array
-from palpate.hands import Pull
 from palpate.mesh import Mesh
 from palpate.model import Body, Contact, Model
 from palpate.simulation import Simulation
 from palpate.viewer.editing import remade
+from palpate.viewer.grip import Grip, patch
 from palpate.viewer.probe import NAME, aim, probe_mesh
 from palpate.viewer.protocol import Command
 from palpate.viewer.surface import Surfaces
@@ -28,7 +27,7 @@ class Hands:
     """Grips by page and number, and at most one probe, which all pages share."""
 
     def __init__(self, simulation: Simulation) -> None:
-        self._grips: dict[tuple[int, int], _Grip] = {}
+        self._grips: dict[tuple[int, int], Grip] = {}
         self._tip = self._target = np.zeros(3)
         self._direction = np.array([0.0, 0.0, -1.0])
         #: How the probe's mesh stands in the model: rotation and tip.
@@ -137,7 +136,7 @@ class Hands:
         if self._tool is not None and self._owner is not None:
             tool = {"tip": self._tip.tolist(), "force": np.asarray(self._tool.force).tolist()}
         return {
-            "pulls": [grip.shown(self._simulation) for grip in self._grips.values()],
+            "pulls": [grip.shown(self._simulation) for grip in self._grips.values() if grip.holds],
             "tool": tool,
         }
 
@@ -152,50 +151,17 @@ class Hands:
         node = int(surfaces.nodes[index][command["node"]])
         reach = _REACH * self._scale
         stiffness = command["strength"] * _natural_force(body) / reach
+        positions = self._simulation.positions[index]
+        nodes, shares = patch(body, positions, node, command["radius"] or 0.0)
         target = np.array(command["target"])
-        pull = self._simulation.pull(index, node, target, stiffness)
-        self._grips[client, command["grip"]] = _Grip(pull, index, node, target, reach)
+        self._grips[client, command["grip"]] = Grip(
+            self._simulation, index, nodes, shares, target, stiffness, reach
+        )
 
     def _put_away(self) -> None:
         self._owner = None
         up = -self._direction / (np.linalg.norm(self._direction) or 1.0)
         self._target = self._target + _AWAY * self._scale * up
-
-
-class _Grip:
-    """A spring from a node to a point, that grows no longer than its reach: a hand, not a crane."""
-
-    def __init__(
-        self, pull: Pull, body: int, node: int, target: Float64Array, reach: float
-    ) -> None:
-        self._pull = pull
-        self._body, self._node = body, node
-        self._target = target
-        self._reach = reach
-
-    def drag(self, target: Float64Array) -> None:
-        self._target = target
-
-    def move(self, positions: tuple[Float64Array, ...]) -> None:
-        at = positions[self._body][self._node]
-        along = self._target - at
-        length = float(np.linalg.norm(along))
-        self._pull.target = at + along * min(1.0, self._reach / max(length, 1e-12))
-
-    @property
-    def holds(self) -> bool:
-        return self._pull.is_active
-
-    def release(self) -> None:
-        self._pull.release()
-
-    def shown(self, simulation: Simulation) -> dict[str, Any]:
-        """From where to where it pulls, and how strongly."""
-        return {
-            "from": simulation.positions[self._body][self._node].tolist(),
-            "to": self._target.tolist(),
-            "force": np.asarray(self._pull.force).tolist(),
-        }
 
 
 def _natural_force(body: Body) -> float:

@@ -16,13 +16,14 @@ from palpate.cutting import Blade
 from palpate.model import Body, Model
 from palpate.results.drawing import looks_of, upward
 from palpate.results.frames import contact_depths
-from palpate.results.measures import node_means, von_mises
+from palpate.results.measures import node_means
+from palpate.results.stress import Strain, VonMises
 from palpate.simulation import Simulation, Snapshot, StepReport
 from palpate.viewer.editing import edited, settings_of, transferred
 from palpate.viewer.hands import Hands
 from palpate.viewer.player import Outcome, Player, Wishes
 from palpate.viewer.protocol import Command, encode, finite
-from palpate.viewer.surface import Strain, Surfaces, deformation
+from palpate.viewer.surface import Surfaces, deformation
 
 #: Seconds between two counts of the tested triangle pairs while nobody looks at them closely.
 _COUNT_INTERVAL = 0.5
@@ -45,13 +46,14 @@ class LivePlayer(Player):
         self._surfaces = Surfaces([body.mesh for body in simulation.model.bodies])
         self._version = 0
         self._sent = -1
-        self._rest = simulation.positions
+        self._rest = tuple(body.mesh.nodes for body in simulation.model.bodies)
         self._report: StepReport | None = None
         self._stats: DetectionStats | None = None
         self._counted = 0.0
         self._undo: list[Snapshot] = []
         self._strain: list[Strain] = []
         self._strain_version = -1
+        self._von_mises = VonMises(simulation)
         self._hands = Hands(simulation)
 
     @property
@@ -123,6 +125,11 @@ class LivePlayer(Player):
             arrays["contact_points"] = contacts.points.astype(np.float32)
             arrays["contact_normals"] = contacts.normals.astype(np.float32)
             arrays["contact_forces"] = np.linalg.norm(contacts.forces, axis=1).astype(np.float32)
+        for level in wishes.levels:
+            boxes = [simulation.boxes(body, level) for body in range(len(positions))]
+            arrays[f"boxes/{level}"] = np.concatenate(boxes).reshape(-1, 6).astype(np.float32)
+            counts = [len(each) for each in boxes]
+            arrays[f"box_counts/{level}"] = np.array(counts, dtype=np.uint32)
         now = time.perf_counter()
         if wishes.touching or now - self._counted > _COUNT_INTERVAL:
             found = simulation.intersections()
@@ -254,6 +261,7 @@ class LivePlayer(Player):
         bodies = self._simulation.model.bodies
         self._surfaces = Surfaces([body.mesh for body in bodies])
         self._rest = tuple(body.mesh.nodes for body in bodies)
+        self._von_mises = VonMises(self._simulation)
         self._version += 1
 
     def _field(self, name: str, positions: tuple[Float64Array, ...]) -> list[Float64Array]:
@@ -266,7 +274,9 @@ class LivePlayer(Player):
         if name == "force":
             return [np.linalg.norm(each, axis=1) for each in self._simulation.contact_forces]
         if name == "strain":
-            return [strain.of(now) for strain, now in zip(self._strains(), positions, strict=True)]
+            return [
+                strain.at_nodes(now) for strain, now in zip(self._strains(), positions, strict=True)
+            ]
         if name == "stress":
             return [self._stress(index) for index in range(len(positions))]
         offsets = np.concatenate([[0], np.cumsum([len(each) for each in positions])])
@@ -274,17 +284,13 @@ class LivePlayer(Player):
         return [depths[start:end] for start, end in pairwise(offsets)]
 
     def _stress(self, index: int) -> Float64Array:
-        """Von Mises stress around each node; 0 for bodies that have none."""
+        """Von Mises stress around each node; 0 for rigid bodies."""
         mesh = self._simulation.model.bodies[index].mesh
-        try:
-            stress = von_mises(self._simulation.stress(index))
-        except ValueError:
-            return np.zeros(len(mesh.nodes))
-        return node_means(stress, mesh.tetrahedra, len(mesh.nodes))
+        return node_means(self._von_mises.of(index), mesh.tetrahedra, len(mesh.nodes))
 
     def _strains(self) -> list[Strain]:
         if self._strain_version != self._version:
-            self._strain = [Strain(body.mesh) for body in self._simulation.model.bodies]
+            self._strain = [Strain(body.mesh, seen=True) for body in self._simulation.model.bodies]
             self._strain_version = self._version
         return self._strain
 

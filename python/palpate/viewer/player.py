@@ -14,6 +14,7 @@ class Wishes:
     """What the pages want to see in each frame, beside the positions."""
 
     fields: frozenset[str] = frozenset()
+    levels: frozenset[int] = frozenset()
     contacts: bool = False
     touching: bool = False
 
@@ -21,6 +22,7 @@ class Wishes:
         """What serves both."""
         return Wishes(
             self.fields | other.fields,
+            self.levels | other.levels,
             self.contacts or other.contacts,
             self.touching or other.touching,
         )

@@ -19,7 +19,8 @@ padded with blanks so that what follows is aligned to four; then the arrays that
     stage, counts), ``pulls``, ``tool``; arrays ``positions`` (N, 3) float32 of all bodies' surface
     nodes in the order of the scene, and on request ``field/NAME`` (N,), ``contact_points``,
     ``contact_normals`` (k, 3), ``contact_forces`` (k,), ``touching`` (t,) uint32, triangles of all
-    bodies in order.
+    bodies in order, ``boxes/LEVEL`` (k, 6), low and high corner of the bounding trees' boxes, and
+    ``box_counts/LEVEL``, how many of them each body has.
 ``notice``, ``problem``
     ``text`` for the user; a problem has a ``title``, and stays until the next ``scene``.
 
@@ -40,7 +41,10 @@ import numpy.typing as npt
 PROTOCOL = 1
 
 #: Fields of a frame that a page may ask for.
-FIELDS = ("displacement", "deformation", "strain", "depth", "force")
+FIELDS = ("displacement", "deformation", "strain", "stress", "depth", "force")
+
+#: Deepest level of the bounding trees that a page may ask for.
+DEEPEST = 16
 
 Command: TypeAlias = dict[str, Any]
 Arrays: TypeAlias = Mapping[str, npt.NDArray[Any]]
@@ -237,6 +241,7 @@ _COMMANDS: dict[str, dict[str, Callable[[Any], Any]]] = {
         "field": _optional(_choice(*FIELDS)),
         "contacts": _boolean,
         "touching": _boolean,
+        "level": _optional(_whole(0, DEEPEST)),
     },
     "grab": {
         "grip": _GRIP,
@@ -244,6 +249,7 @@ _COMMANDS: dict[str, dict[str, Callable[[Any], Any]]] = {
         "node": _whole(0, 2**31),
         "target": _vector,
         "strength": _number(1e-3, 1e3),
+        "radius": _optional(_number(0, 1e3)),  # null: that node alone
     },
     "drag": {"grip": _GRIP, "target": _vector},
     "release": {"grip": _GRIP},

@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from palpate._arrays import Float64Array
 from palpate.results.drawing import Look, Moment, chosen_looks
+from palpate.results.measures import node_means
 from palpate.results.reading import RecordingError, read_frame, read_report, read_series
 from palpate.viewer.player import Outcome, Player, Wishes
 from palpate.viewer.protocol import Command, encode, finite
@@ -22,7 +23,9 @@ from palpate.viewer.surface import Surfaces, deformation
 _KEPT = 48
 _NAMES = ("Points", "displacement", "contact_force", "contact_depth")
 _CELLS = ("connectivity", "offsets", "body")
-_FIELDS = ("displacement", "deformation", "depth", "force")
+#: Of each frame's cells; older runs do not have it.
+_STRESS = "von_mises"
+_FIELDS = ("displacement", "deformation", "stress", "depth", "force")
 
 
 class Recording:
@@ -54,7 +57,7 @@ class Recording:
     def frame(self, index: int) -> tuple[dict[str, npt.NDArray[Any]], _Parts]:
         """The arrays of a frame, and its bodies' parts of them."""
         if index not in self._read:
-            self._read[index] = read_frame(self._frames[index][1], (*_NAMES, *_CELLS))
+            self._read[index] = read_frame(self._frames[index][1], (*_NAMES, *_CELLS, _STRESS))
             if "Points" not in self._read[index]:
                 raise RecordingError(f"{self._frames[index][1]}: no points in it")
             while len(self._read) > _KEPT:
@@ -102,16 +105,23 @@ class _Parts:
         last = np.zeros(count, dtype=np.int64)
         np.maximum.at(last, owners, nodes + 1)
         self.ranges = list(pairwise([0, *last[:-1].tolist(), len(arrays["Points"])]))
+        self._of_body = [body == index for index in range(count)]
+        self._cells: list[npt.NDArray[np.int64]] = []
         triangles = []
         for index, (start, _) in enumerate(self.ranges):
-            cells = nodes[owners == index]
-            corners = sizes[body == index]
-            if (corners == 4).all():
-                triangles.append(boundary(cells.reshape(-1, 4) - start))
-            else:
-                triangles.append(cells.reshape(-1, 3) - start)
-        counts = [end - start for start, end in self.ranges]
-        self.surfaces = Surfaces.of_triangles(triangles, counts)
+            solid = (sizes[self._of_body[index]] == 4).all()
+            cells = nodes[owners == index].reshape(-1, 4 if solid else 3) - start
+            self._cells.append(cells)
+            triangles.append(boundary(cells) if solid else cells)
+        self._counts = [end - start for start, end in self.ranges]
+        self.surfaces = Surfaces.of_triangles(triangles, self._counts)
+
+    def node_means(self, values: npt.NDArray[np.float64]) -> list[Float64Array]:
+        """Per body the mean of the cells around each node, from one number per cell."""
+        return [
+            node_means(values[own], cells, count)
+            for own, cells, count in zip(self._of_body, self._cells, self._counts, strict=True)
+        ]
 
     def split(self, rows: npt.NDArray[Any]) -> list[npt.NDArray[Any]]:
         """One array per body."""
@@ -157,7 +167,7 @@ class RecordedPlayer(Player):
         return {
             "title": self._recording.title,
             "features": ["reset"],
-            "fields": list(_FIELDS),
+            "fields": [each for each in _FIELDS if each != "stress" or _STRESS in self._arrays],
             "times": self._recording.times,
         }
 
@@ -201,7 +211,7 @@ class RecordedPlayer(Player):
         surfaces = self._parts.surfaces
         points = self._parts.split(self._arrays["Points"])
         message: dict[str, npt.NDArray[Any]] = {"positions": surfaces.stack(points)}
-        for name in wishes.fields.intersection(_FIELDS):
+        for name in wishes.fields.intersection(self.hello()["fields"]):
             message[f"field/{name}"] = surfaces.stack_values(self._field(name, points))
         header = {
             "version": self._version,
@@ -236,6 +246,8 @@ class RecordedPlayer(Player):
         if name == "deformation":
             rest = self._parts.split(self._rest())
             return [deformation(before, now) for before, now in zip(rest, points, strict=True)]
+        if name == "stress":
+            return self._parts.node_means(self._arrays[_STRESS].astype(np.float64))
         stored = {
             "displacement": "displacement",
             "depth": "contact_depth",

@@ -206,9 +206,13 @@ class Session:
             if self._player is not None:
                 self._player.leave(client)
         elif kind == "show":
-            field = command["field"]
-            fields = frozenset([field] if field is not None else [])
-            self._wishes[client] = Wishes(fields, command["contacts"], command["touching"])
+            field, level = command["field"], command["level"]
+            self._wishes[client] = Wishes(
+                frozenset([] if field is None else [field]),
+                frozenset([] if level is None else [level]),
+                command["contacts"],
+                command["touching"],
+            )
             self._stale = True
         elif kind == "refresh":
             self._stale = True

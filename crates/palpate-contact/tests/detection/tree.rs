@@ -1,6 +1,7 @@
 //! The shape of bounding trees.
 
 use palpate_contact::{BoundingTree, Split, TreeDefect};
+use palpate_geometry::Aabb;
 use palpate_model::{Mesh, MeshData};
 
 use crate::scenes::{Random, block, horseshoe, jittered, sheet};
@@ -36,6 +37,48 @@ fn leaves_hold_at_most_k() {
             if split == Split::Count {
                 let halvings = (stats.element_count as f64 / leaf_size as f64).log2().ceil();
                 assert!(stats.depth_max as f64 <= halvings.max(0.0) + 1.0);
+            }
+        }
+    }
+}
+
+/// Boxes of a level by going down the children.
+fn level_bounds(tree: &BoundingTree, node: usize, level: usize, found: &mut Vec<Aabb>) {
+    match tree.children(node) {
+        Some(children) if level > 0 => {
+            for child in children {
+                level_bounds(tree, child, level - 1, found);
+            }
+        }
+        _ => found.extend(Some(tree.nodes()[node].bounds).filter(|bounds| !bounds.is_empty())),
+    }
+}
+
+#[test]
+fn every_level_holds_the_surface() {
+    let mut random = Random(5);
+    let meshes = [
+        block([5, 4, 3], |p| p),
+        jittered([4, 4, 6], [0.0; 3], 0.2, &mut random),
+        sheet(4, 3, |p| p),
+    ];
+    for mesh in meshes {
+        for split in [Split::Middle, Split::Count] {
+            let tree = BoundingTree::new(&mesh, 2, split);
+            assert_eq!(tree.level_bounds(0), [tree.bounds()]);
+            let mut count = 0;
+            for level in 0..=tree.stats().depth_max + 1 {
+                let boxes = tree.level_bounds(level);
+                let mut expected = Vec::new();
+                level_bounds(&tree, 0, level, &mut expected);
+                assert_eq!(boxes, expected);
+                assert!(boxes.len() >= count);
+                count = boxes.len();
+                for triangle in mesh.triangles() {
+                    let corners = triangle.map(|node| mesh.nodes()[node as usize]);
+                    let inside = |bounds: &Aabb| corners.iter().all(|at| bounds.contains(at));
+                    assert!(boxes.iter().any(inside));
+                }
             }
         }
     }

@@ -1,7 +1,7 @@
 // The surfaces of the bodies: sharp at creases, smooth elsewhere, moved in place each frame.
 
 import { BufferAttribute, BufferGeometry, Color, DoubleSide, DynamicDrawUsage, Mesh, MeshLambertMaterial, MeshPhysicalMaterial, SRGBColorSpace } from "three";
-import { RAMP, rampIndex } from "palpate/colors";
+import { rampIndex } from "palpate/colors";
 
 /** Cosine of the angle between neighbours from which an edge is drawn sharp. */
 const CREASE = 0.6;
@@ -44,7 +44,7 @@ export class BodyMesh extends Mesh {
   }
 
   /** Colour by values of the frame's nodes, from 0 to `high`; null: the body's own colour. */
-  paint(values, high) {
+  paint(values, high, colors) {
     const painted = values !== null;
     if (painted) {
       let attribute = this.geometry.attributes.color;
@@ -55,9 +55,9 @@ export class BodyMesh extends Mesh {
       const { array } = attribute;
       for (let i = 0, j = 0; i < this.origin.length; i++, j += 3) {
         const at = rampIndex(values[this.start + this.origin[i]] / high);
-        array[j] = RAMP[at];
-        array[j + 1] = RAMP[at + 1];
-        array[j + 2] = RAMP[at + 2];
+        array[j] = colors[at];
+        array[j + 1] = colors[at + 1];
+        array[j + 2] = colors[at + 2];
       }
       attribute.needsUpdate = true;
     }

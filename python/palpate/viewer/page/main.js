@@ -1,12 +1,12 @@
 // Puts the page together: messages come in, the stage and the panel follow, commands go out.
 
-import { FIELDS } from "palpate/colors";
+import { FIELDS, endOfScale } from "palpate/colors";
 import { Connection } from "palpate/connection";
 import { Transport } from "palpate/controls";
 import { Overlay } from "palpate/overlay";
 import { Panel, showLegend } from "palpate/panel";
 import { Pointer } from "palpate/pointer";
-import { PROTOCOL, positionsOf } from "palpate/protocol";
+import { DEEPEST, PROTOCOL, positionsOf, valuesOf } from "palpate/protocol";
 import { Recording } from "palpate/recording";
 import { Stage } from "palpate/stage";
 
@@ -18,7 +18,7 @@ const find = (name) => document.getElementById(name);
 class App {
   constructor() {
     this.view = {
-      field: null, contacts: false, touching: false, wireframe: false, boxes: false, grid: true, opacity: 1, strength: 1, probe: 1, cutDepth: null,
+      field: null, range: 1, contacts: false, touching: false, wireframe: false, boxes: false, level: 0, grid: true, opacity: 1, strength: 1, grip: 1, probe: 1, cutDepth: null,
     };
     this.mode = "look";
     this.features = [];
@@ -35,7 +35,7 @@ class App {
     again.onclick = () => this.send({ type: "reload" });
     look.onclick = () => (find("problem").hidden = true);
     addEventListener("keydown", (event) => this.key(event));
-    if (innerWidth < 900) document.body.classList.add("bare");
+    this.togglePanel(innerWidth >= 900);
     this.setMode("look");
     const recording = find("recording");
     const Source = recording ? Recording : Connection;
@@ -112,7 +112,8 @@ class App {
     this.unframed = false;
     this.time = header.time;
     this.overlay.update(message, positions, this.view);
-    this.paint(header, arrays, positions);
+    if (this.view.boxes && this.modeOfSource === "live") this.panel.tellLevel(this.overlay.boxCount);
+    this.paint(header, positions);
     this.transport.moment(header);
     this.chips(header);
     const probe = this.stage.bodies.find((body) => body.look.name === PROBE);
@@ -133,24 +134,22 @@ class App {
     }, 250);
   }
 
-  paint(header, arrays, positions) {
+  paint(header, positions) {
     const { field } = this.view;
-    let values = arrays[`field/${field}`] ?? null;
-    if (!values && header.quantised && field === "displacement") values = this.displacements(positions);
+    const values = field === "displacement" && header.quantised ? this.displacements(positions) : valuesOf(this.last, field);
     if (!field || !values) {
       for (const body of this.stage.bodies) body.paint(null);
       showLegend(find("legend"), null);
       return;
     }
-    let most = 0;
-    for (const body of this.stage.bodies) {
-      if (body.look.rigid) continue;
-      for (let i = body.start; i < body.start + body.nodeCount; i++) most = Math.max(most, values[i]);
-    }
+    const soft = this.stage.bodies.filter((body) => !body.look.rigid);
+    const most = Math.max(...soft.map((body) => endOfScale(values.subarray(body.start, body.start + body.nodeCount))));
+    const { least, unit, ramp } = FIELDS[field];
     // The range grows at once and shrinks slowly, so that colours do not flicker.
-    this.high = Math.max(most, 0.985 * this.high, FIELDS[field].least * (FIELDS[field].unit === "m" ? this.stage.size : 1));
-    for (const body of this.stage.bodies) body.paint(body.look.rigid ? null : values, this.high);
-    showLegend(find("legend"), field, this.high);
+    this.high = Math.max(most, 0.985 * this.high, least * (unit === "m" ? this.stage.size : 1));
+    const high = this.view.range * this.high;
+    for (const body of this.stage.bodies) body.paint(body.look.rigid ? null : values, high, ramp.colors);
+    showLegend(find("legend"), field, high);
   }
 
   displacements(positions) {
@@ -220,13 +219,16 @@ class App {
   /** Change what is shown: any of the entries of `view`. */
   set(change) {
     Object.assign(this.view, change);
-    if ("field" in change) this.high = 0;
+    if ("field" in change) {
+      this.high = 0;
+      this.view.range = 1;
+    }
     this.panel.reflect(this.view);
     this.restyle(change);
     this.subscribe();
     if (this.last) {
       this.overlay.update(this.last, this.positions, this.view);
-      this.paint(this.last.header, this.last.arrays, this.positions);
+      this.paint(this.last.header, this.positions);
     }
     this.stage.touch();
   }
@@ -240,8 +242,15 @@ class App {
   }
 
   subscribe() {
-    const { field, contacts, touching } = this.view;
-    this.send({ type: "show", field, contacts, touching });
+    const { field, contacts, touching, boxes, level } = this.view;
+    // The boxes of whole bodies are made of the positions, here.
+    this.send({ type: "show", field, contacts, touching, level: boxes && level > 0 ? level : null });
+  }
+
+  /** Show the boxes of a deeper or higher level of the bounding trees. */
+  moveLevel(by) {
+    if (this.modeOfSource !== "live") return;
+    this.set({ boxes: true, level: Math.min(DEEPEST, Math.max(0, this.view.level + by)) });
   }
 
   setMode(mode) {
@@ -273,8 +282,9 @@ class App {
     find("help").showModal();
   }
 
-  togglePanel() {
-    document.body.classList.toggle("bare");
+  togglePanel(shown = document.body.classList.contains("bare")) {
+    document.body.classList.toggle("bare", !shown);
+    this.stage.cover(shown ? find("panel").offsetWidth : 0);
   }
 
   key(event) {
@@ -287,6 +297,7 @@ class App {
     const actions = {
       " ": () => this.togglePlay(), arrowright: () => this.step(), r: () => this.reset(), f: () => this.stage.frameCamera(),
       z: () => this.can("cut") && this.send({ type: "undo" }), p: () => this.togglePanel(), escape: () => this.pointer.cancel(), "?": () => this.help(), s: () => this.savePicture(),
+      "[": () => this.moveLevel(-1), "]": () => this.moveLevel(1),
     };
     if (toggles[key]) this.set({ [toggles[key]]: !this.view[toggles[key]] });
     else if (modes[key]) {

@@ -7,6 +7,8 @@ import {
 import { withUnit } from "palpate/text";
 
 const UP = new Vector3(0, 1, 0);
+/** Nodes of a grip that are shown at most. */
+const HELD = 32;
 const EDGES = [0, 1, 0, 2, 0, 4, 1, 3, 1, 5, 2, 3, 2, 6, 3, 7, 4, 5, 4, 6, 5, 7, 6, 7];
 
 export class Overlay {
@@ -23,7 +25,7 @@ export class Overlay {
         color: 0xffd33d, side: DoubleSide, transparent: true, opacity: 0.85, polygonOffset: true, polygonOffsetFactor: -2, polygonOffsetUnits: -2,
       }),
     );
-    this.boxes = new LineSegments(new BufferGeometry(), new LineBasicMaterial({ color: 0x0f6b78, transparent: true, opacity: 0.75 }));
+    this.boxes = new LineSegments(new BufferGeometry(), new LineBasicMaterial({ vertexColors: true, transparent: true, opacity: 0.8 }));
     this.touching.frustumCulled = this.boxes.frustumCulled = false;
     this.touching.renderOrder = 2;
     this.group.add(this.touching, this.boxes);
@@ -36,7 +38,8 @@ export class Overlay {
   update({ header, arrays }, positions, shown) {
     this.contacts(shown.contacts ? arrays : {});
     this.touch(shown.touching ? arrays.touching : undefined, positions);
-    this.bodyBoxes(shown.boxes, positions);
+    this.boxes.visible = shown.boxes;
+    if (shown.boxes) this.showBoxes(arrays[`boxes/${shown.level}`], arrays[`box_counts/${shown.level}`], positions);
     this.showPulls(header.pulls ?? []);
     this.marks = (header.pulls ?? []).map((pull) => ({ at: pull.to, text: withUnit(Math.hypot(...pull.force), "N") }));
     if (header.tool) this.marks.push({ at: header.tool.tip, text: withUnit(Math.hypot(...header.tool.force), "N") });
@@ -107,23 +110,40 @@ export class Overlay {
     geometry.setAttribute("position", new BufferAttribute(corners, 3).setUsage(DynamicDrawUsage));
   }
 
-  /** The box of each body. */
-  bodyBoxes(on, positions) {
-    this.boxes.visible = on;
-    if (!on) return;
-    const lines = [];
-    for (const body of this.stage.bodies) {
+  /** Boxes of the bounding trees, `counts` of them per body; without any, one around each body. */
+  showBoxes(boxes, counts, positions) {
+    boxes ??= this.bodyBoxes(positions);
+    counts ??= this.stage.bodies.map(() => 1);
+    const lines = new Float32Array((boxes.length / 6) * 3 * EDGES.length);
+    const colors = new Float32Array(lines.length);
+    let to = 0;
+    let box = 0;
+    this.stage.bodies.forEach((body, i) => {
+      const color = body.tint.multiplyScalar(body.look.rigid ? 0.6 : 0.35).toArray();
+      for (const end = box + counts[i]; box < end; box++) {
+        if (!body.visible) continue;
+        for (let at = to; at < to + 3 * EDGES.length; at += 3) colors.set(color, at);
+        for (const corner of EDGES) {
+          for (let axis = 0; axis < 3; axis++) lines[to++] = boxes[6 * box + axis + ((corner >> axis) & 1 ? 3 : 0)];
+        }
+      }
+    });
+    this.boxCount = to / 3 / EDGES.length;
+    const { geometry } = this.boxes;
+    geometry.setAttribute("position", new BufferAttribute(lines.subarray(0, to), 3));
+    geometry.setAttribute("color", new BufferAttribute(colors.subarray(0, to), 3));
+  }
+
+  bodyBoxes(positions) {
+    return this.stage.bodies.flatMap((body) => {
       const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
       for (let i = 3 * body.start, end = i + 3 * body.nodeCount; i < end; i++) {
         const axis = i % 3;
         low[axis] = Math.min(low[axis], positions[i]);
         high[axis] = Math.max(high[axis], positions[i]);
       }
-      for (const corner of EDGES) {
-        for (let axis = 0; axis < 3; axis++) lines.push((corner >> axis) & 1 ? high[axis] : low[axis]);
-      }
-    }
-    this.boxes.geometry.setAttribute("position", new BufferAttribute(new Float32Array(lines), 3));
+      return [...low, ...high];
+    });
   }
 
   showPulls(pulls) {
@@ -149,14 +169,16 @@ export class Overlay {
   }
 }
 
-/** A ball at the grip, a ball at the hand, and the spring between them. */
+/** A ball at the grip, dots at the nodes that it holds, a ball at the hand, and the spring between them. */
 class PullMark {
   constructor(group) {
     const style = { depthTest: false, transparent: true };
     this.hand = new Mesh(new SphereGeometry(1, 16, 12), new MeshBasicMaterial({ color: 0x0f6b78, ...style }));
     this.grip = new Mesh(this.hand.geometry, new MeshBasicMaterial({ color: 0xffffff, ...style }));
     this.spring = new Mesh(new CylinderGeometry(1, 1, 1, 8).translate(0, 0.5, 0), this.hand.material);
-    for (const each of [this.spring, this.grip, this.hand]) {
+    this.held = new InstancedMesh(this.hand.geometry, this.grip.material, HELD);
+    this.parts = [this.spring, this.held, this.grip, this.hand];
+    for (const each of this.parts) {
       each.renderOrder = 6;
       each.frustumCulled = false;
       group.add(each);
@@ -164,8 +186,12 @@ class PullMark {
   }
 
   show(pull, size) {
-    for (const each of [this.spring, this.grip, this.hand]) each.visible = Boolean(pull);
+    for (const each of this.parts) each.visible = Boolean(pull);
     if (!pull) return;
+    this.held.count = Math.min(HELD, pull.held.length);
+    const dot = new Matrix4().makeScale(...Array(3).fill(0.0035 * size));
+    for (let i = 0; i < this.held.count; i++) this.held.setMatrixAt(i, dot.setPosition(...pull.held[i]));
+    this.held.instanceMatrix.needsUpdate = true;
     const from = new Vector3(...pull.from), to = new Vector3(...pull.to);
     this.grip.position.copy(from);
     this.grip.scale.setScalar(0.008 * size);

@@ -1,7 +1,8 @@
 // The panel at the right: figures, what is shown, bodies with their settings, the simulation.
 
 import { Chart } from "palpate/chart";
-import { FIELDS, GRADIENT } from "palpate/colors";
+import { FIELDS } from "palpate/colors";
+import { DEEPEST } from "palpate/protocol";
 import { digits, icon, make, whole, withUnit } from "palpate/text";
 
 const EYE = "M2.5 12S6 5.5 12 5.5 21.5 12 21.5 12 18 18.5 12 18.5 2.5 12 2.5 12zM12 9a3 3 0 1 1 0 6 3 3 0 0 1 0-6";
@@ -76,8 +77,17 @@ export class Panel {
     };
     const opacity = make("input", { type: "range", min: 0.1, max: 1, step: 0.05, value: app.view.opacity, "aria-label": "Opacity of soft bodies" });
     opacity.oninput = () => app.set({ opacity: Number(opacity.value) });
+    const range = make("input", { type: "range", min: -2, max: 0, step: "any", value: 0, "aria-label": "Range of the colours" });
+    range.oninput = () => app.set({ range: 10 ** Number(range.value) });
+    this.range = range;
+    range.disabled = !app.view.field;
+    const level = make("input", { type: "range", min: 0, max: DEEPEST, step: 1, value: app.view.level, "aria-label": "Level of the bounding trees" });
+    level.oninput = () => app.set({ boxes: true, level: Number(level.value) });
+    this.level = level;
+    this.levelText = make("span", { class: "unit" });
     this.show.body.replaceChildren(
       make("div", { class: "row" }, make("label", { for: "field" }, "Colours"), select),
+      make("div", { class: "row", title: "Less shows small values; what is above has the last colour" }, make("span", { class: "name" }, "Range"), range),
       make("div", { class: "row" }, make("span", { class: "name" }, "Opacity"), opacity),
       make(
         "div",
@@ -88,6 +98,19 @@ export class Panel {
         check("grid", "Ground", "Grid and shadow (G)"),
       ),
     );
+    if (!this.live) return;
+    const title = "How many splits below the box of the body, level 0 ([ and ])";
+    this.show.body.append(
+      make("div", { class: "row", title }, make("span", { class: "name" }, "Tree level"), make("div", { class: "field" }, level, this.levelText)),
+    );
+    this.tellLevel();
+  }
+
+  /** The level of the boxes and how many there are. */
+  tellLevel(count) {
+    const { boxes, level } = this.app.view;
+    this.level.value = level;
+    this.levelText.textContent = boxes && count !== undefined ? `${level}: ${whole(count)} boxes` : String(level);
   }
 
   buildHands() {
@@ -108,6 +131,7 @@ export class Panel {
     const row = (name, field, feature) => Object.assign(make("div", { class: "row" }, make("span", { class: "name" }, name), field), { feature });
     this.handRows = [
       row("Spring", range("strength", -1.5, 1.5, (x) => 10 ** x, Math.log10, (x) => `${digits(x, 2)}×`), "pull"),
+      row("Grip", range("grip", -0.7, 0.7, (x) => 10 ** x, Math.log10, (x) => `${digits(x, 2)}×`), "pull"),
       row("Probe", range("probe", -0.7, 0.7, (x) => 10 ** x, Math.log10, (x) => `${digits(x, 2)}×`), "tool"),
       row("Cut depth", make("div", { class: "field" }, depth, make("span", { class: "unit" }, "mm")), "cut"),
     ];
@@ -242,7 +266,10 @@ export class Panel {
 
   reflect(view) {
     this.element.querySelector("#field").value = view.field ?? "";
+    this.range.value = Math.log10(view.range);
+    this.range.disabled = !view.field;
     for (const input of this.element.querySelectorAll("[data-view]")) input.checked = view[input.dataset.view];
+    if (this.live) this.tellLevel();
   }
 }
 
@@ -250,16 +277,19 @@ export class Panel {
 export function showLegend(element, field, high) {
   element.hidden = !field;
   if (!field) return;
-  const { name, unit, note } = FIELDS[field];
+  const { name, unit, note, ramp } = FIELDS[field];
   if (element.dataset.field !== field) {
     element.dataset.field = field;
     element.replaceChildren(
-      make("b", { title: note }, name),
-      Object.assign(make("div", { class: "ramp" }), { style: `background:${GRADIENT}` }),
-      make("div", { class: "ends" }, make("span", {}, "0"), make("span", {}, "")),
+      make("b", {}, name),
+      make("p", {}, note),
+      Object.assign(make("div", { class: "ramp" }), { style: `background:${ramp.css}` }),
+      make("div", { class: "ends" }, make("span", {}, "0"), make("span", {}), make("span", { title: "and more" })),
     );
   }
-  element.querySelector(".ends").lastChild.textContent = withUnit(high, unit);
+  const [, middle, end] = element.querySelector(".ends").children;
+  middle.textContent = withUnit(high / 2, unit);
+  end.textContent = `≥ ${withUnit(high, unit)}`;
 }
 
 function section(title, open) {

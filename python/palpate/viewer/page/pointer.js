@@ -2,6 +2,9 @@
 
 import { Plane, Raycaster, Vector2, Vector3 } from "three";
 
+/** Radius of what a hand holds, in sizes of the scene. */
+const HOLD = 0.035;
+
 let nextGrip = 1;
 
 export class Pointer {
@@ -106,7 +109,7 @@ export class Pointer {
       const on = this.ray(pointer).intersectPlane(plane, new Vector3());
       return on ? stage.world.worldToLocal(on.add(offset)).toArray() : null;
     };
-    app.send({ type: "grab", grip, body: stage.bodies.indexOf(hit.body), node, target: Array.from(at), strength: app.view.strength });
+    app.send({ type: "grab", grip, body: stage.bodies.indexOf(hit.body), node, target: Array.from(at), strength: app.view.strength, radius: HOLD * stage.size * app.view.grip });
     return {
       move: (pointer) => {
         const to = target(pointer);

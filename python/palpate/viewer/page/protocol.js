@@ -2,6 +2,9 @@
 
 export const PROTOCOL = 1;
 
+/** Deepest level of the bounding trees that may be asked for. */
+export const DEEPEST = 16;
+
 const TYPES = { float32: Float32Array, uint32: Uint32Array, uint16: Uint16Array, uint8: Uint8Array };
 const text = new TextDecoder();
 
@@ -29,4 +32,11 @@ export function positionsOf({ header, arrays }) {
   const result = new Float32Array(whole.length);
   for (let i = 0; i < whole.length; i++) result[i] = low[i % 3] + whole[i] * step[i % 3];
   return result;
+}
+
+/** Values of a frame's nodes that a colour stands for, or null: those of an exported film are shades of the largest. */
+export function valuesOf({ header, arrays }, field) {
+  const values = arrays[`field/${field}`] ?? null;
+  const high = header.quantised?.high[field];
+  return values && high !== undefined ? Float32Array.from(values, (shade) => (shade / 255) * high) : values;
 }

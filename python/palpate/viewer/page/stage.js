@@ -30,6 +30,7 @@ export class Stage {
     this.world = new Group();
     this.scene.add(this.world);
     this.bodies = [];
+    this.covered = 0;
     this.frames = 0;
     this.light();
     this.ground = makeGround();
@@ -134,7 +135,7 @@ export class Stage {
     this.cameraMoved = false;
     const half = Math.tan((this.camera.fov * Math.PI) / 360);
     const reach = Math.max(0.3, high.distanceTo(low) / 2);
-    const distance = (1.05 * reach) / (half * Math.min(1, this.camera.aspect));
+    const distance = (1.05 * reach) / (half * Math.min(1, this.camera.aspect * (1 - this.covered / this.container.clientWidth)));
     this.controls.target.copy(low).add(high).multiplyScalar(0.5);
     this.camera.position.set(0.48, 0.5, 1).normalize().multiplyScalar(distance).add(this.controls.target);
     this.controls.update();
@@ -158,13 +159,19 @@ export class Stage {
     this.dirty = true;
   }
 
+  /** So many pixels at the right are covered: the middle is in the rest. */
+  cover(pixels) {
+    this.covered = pixels;
+    this.resize();
+  }
+
   resize() {
     const { clientWidth: width, clientHeight: height } = this.container;
     if (width === 0 || height === 0) return;
     this.renderer.setPixelRatio(this.plain ? 1 : Math.min(devicePixelRatio, 2));
     this.renderer.setSize(width, height, false);
     this.camera.aspect = width / height;
-    this.camera.updateProjectionMatrix();
+    this.camera.setViewOffset(width, height, this.covered / 2, 0, width, height); // updates the projection
     this.touch();
   }
 
