@@ -4,6 +4,7 @@ mod change;
 mod drive;
 mod hands;
 
+use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
@@ -716,30 +717,29 @@ fn check_array(
     }
 }
 
-/// The task of each body: one per processor that the model names, in turn over the threads; the
-/// others go, largest first, to the task with the fewest nodes.
+/// The task of each body: the bodies of one processor that the model names stay together, and
+/// processors, like bodies without one, go, largest first, to the task with the fewest nodes.
 fn assign_tasks(model: &Model, threads: usize) -> Vec<usize> {
-    let mut processors: Vec<u32> = model.bodies.iter().filter_map(|body| body.processor).collect();
-    processors.sort_unstable();
-    processors.dedup();
+    let mut groups: Vec<(usize, Vec<usize>)> = Vec::new();
+    let mut group_of = BTreeMap::new();
+    for (index, body) in model.bodies.iter().enumerate() {
+        let own = groups.len();
+        let group = body.processor.map_or(own, |id| *group_of.entry(id).or_insert(own));
+        if group == own {
+            groups.push((0, Vec::new()));
+        }
+        groups[group].0 += body.mesh.nodes().len();
+        groups[group].1.push(index);
+    }
+    groups.sort_by_key(|&(nodes, _)| std::cmp::Reverse(nodes));
     let mut load = vec![0; threads];
     let mut task_of = vec![0; model.bodies.len()];
-    let mut unassigned = Vec::new();
-    for (index, body) in model.bodies.iter().enumerate() {
-        match body.processor {
-            Some(id) => {
-                let rank = processors.binary_search(&id).expect("collected above");
-                task_of[index] = rank % threads;
-                load[rank % threads] += body.mesh.nodes().len();
-            }
-            None => unassigned.push(index),
-        }
-    }
-    unassigned.sort_by_key(|&index| std::cmp::Reverse(model.bodies[index].mesh.nodes().len()));
-    for index in unassigned {
+    for (nodes, bodies) in groups {
         let task = (0..threads).min_by_key(|&task| load[task]).expect("at least one thread");
-        task_of[index] = task;
-        load[task] += model.bodies[index].mesh.nodes().len();
+        load[task] += nodes;
+        for body in bodies {
+            task_of[body] = task;
+        }
     }
     task_of
 }

@@ -122,18 +122,14 @@ impl Turning {
         &self.rotations
     }
 
-    /// What P adds to the response of A^-1 alone to forces on some nodes: a turn t and a counter-turn
-    /// c, by which a node moves `t x arm - response c`.
-    pub(crate) fn coefficients(&self, loads: impl Iterator<Item = (u32, DVec3)>) -> [DVec3; 2] {
-        let (mut torque, mut loaded) = (DVec3::ZERO, DVec3::ZERO);
-        for (node, load) in loads {
-            torque += self.rotations.arms[node as usize].cross(load);
-            loaded += DVec3::from_array(
-                columns(&self.loaded[node as usize]).map(|column| column.dot(load)),
-            );
-        }
+    /// What P adds to the response of A^-1 alone to a force on a node: a turn t and a counter-turn c per
+    /// force, by which a node moves `t x arm - response c`.
+    pub(crate) fn coefficients(&self, node: u32) -> [DMat3; 2] {
+        let arm = self.rotations.arms[node as usize];
         let s = self.rotations.inverse_inertia;
-        [self.both * torque - s * loaded, s * torque]
+        let torque =
+            DMat3::from_cols(arm.cross(DVec3::X), arm.cross(DVec3::Y), arm.cross(DVec3::Z));
+        [self.both * torque - s * self.response(node).transpose(), s * torque]
     }
 
     /// Arm of a node about the centre, in the frame [m].
@@ -185,9 +181,9 @@ mod tests {
         }
         turning.rotations().turn(&masses, torque, &mut response);
 
-        let coefficients = turning.coefficients(loads.into_iter());
+        let coefficients = loads.map(|(node, load)| turning.coefficients(node).map(|c| c * load));
+        let [turn, counter] = [0, 1].map(|k| coefficients[0][k] + coefficients[1][k]);
         for node in 0..5_u32 {
-            let [turn, counter] = coefficients;
             let mut sum = turn.cross(turning.arm(node)) - turning.response(node) * counter;
             for (loaded, load) in loads {
                 if loaded == node {

@@ -15,13 +15,15 @@ use crate::body::turning::Turning;
 
 /// Entries behind the displacements of the nodes: how far the body turns, and counter-turns.
 const TURN_LEN: usize = 6;
+/// Part of the largest force on a node that round-off leaves of forces that have not changed.
+const NEGLIGIBLE: f64 = 1e-9;
 
 /// The nodes of one body that a contact holds, with their weights, and how it turns the body.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Corners {
     nodes: [u32; 4],
     slots: [u32; 4],
-    weights: [f32; 4],
+    weights: [f64; 4],
     count: u32,
     turns: bool,
     /// Turn and counter-turn per force on the contact.
@@ -35,7 +37,7 @@ impl Corners {
     pub(super) fn push(&mut self, node: u32, weight: f64) {
         let place = self.count as usize;
         self.nodes[place] = node;
-        self.weights[place] = weight as f32;
+        self.weights[place] = weight;
         self.count += 1;
     }
 
@@ -44,26 +46,24 @@ impl Corners {
     }
 
     fn nodes(&self) -> impl Iterator<Item = (u32, f64)> + '_ {
-        let weights = self.weights.iter().map(|&weight| f64::from(weight));
-        self.nodes.iter().copied().zip(weights).take(self.count as usize)
+        self.nodes.iter().copied().zip(self.weights).take(self.count as usize)
     }
 
-    fn slots(&self) -> impl Iterator<Item = (usize, f32)> + '_ {
+    fn slots(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
         let slots = self.slots.iter().map(|&slot| slot as usize);
         slots.zip(self.weights).take(self.count as usize)
     }
 
-    fn set_turning(&mut self, turning: &Turning) {
-        let (mut arm, mut loaded) = (DVec3::ZERO, DMat3::ZERO);
-        for (node, weight) in self.nodes() {
+    fn set_turning(&mut self, turning: &Turning, turns: &[[DMat3; 2]]) {
+        let (mut arm, mut loaded, mut turn) = (DVec3::ZERO, DMat3::ZERO, [DMat3::ZERO; 2]);
+        for (slot, (node, weight)) in self.slots.iter().zip(self.nodes()) {
             arm += weight * turning.arm(node);
             loaded += weight * turning.response(node);
+            for (sum, node) in turn.iter_mut().zip(turns[*slot as usize]) {
+                *sum += weight * node;
+            }
         }
-        let coefficients = [DVec3::X, DVec3::Y, DVec3::Z]
-            .map(|axis| turning.coefficients(self.nodes().map(|(node, w)| (node, w * axis))));
-        let [x, y, z] = coefficients.map(|[turn, _]| turn.as_vec3());
-        let [counter_x, counter_y, counter_z] = coefficients.map(|[_, turn]| turn.as_vec3());
-        self.turn = [Mat3::from_cols(x, y, z), Mat3::from_cols(counter_x, counter_y, counter_z)];
+        self.turn = turn.map(|turn| turn.as_mat3());
         self.arm = arm.as_vec3();
         self.loaded = loaded.as_mat3();
         self.turns = true;
@@ -79,9 +79,10 @@ impl Corners {
 pub(super) struct Coupling {
     nodes: NodeCompliance,
     contacts: Vec<Corners>,
-    /// Force on each slot [N] and what it does.
-    loads: Vec<Vec3>,
-    loaded: Vec<f32>,
+    /// Expected force on each slot [N].
+    expected: Vec<DVec3>,
+    /// Turn and counter-turn per force on each slot; empty when forces do not turn the body.
+    turns: Vec<[DMat3; 2]>,
 }
 
 impl Coupling {
@@ -104,11 +105,13 @@ impl Coupling {
             count: 1,
             ..Corners::default()
         };
-        Self { nodes, contacts: (0..count as u32).map(corners).collect(), ..Self::default() }
+        let contacts = (0..count as u32).map(corners).collect();
+        let expected = vec![DVec3::ZERO; nodes.stride()];
+        Self { nodes, contacts, expected, ..Self::default() }
     }
 
-    /// Takes in the compliance of `nodes`, which must be prepared, and the `forces` on some of
-    /// them, in the frame, for [`Coupling::displacement`].
+    /// Takes in the compliance of `nodes`, which must be prepared, and the expected `forces` on some of
+    /// them, in the frame.
     pub(super) fn assemble(
         &mut self,
         body: &MovingBody,
@@ -119,47 +122,26 @@ impl Coupling {
             self.nodes.gather(elastic, &body.compliance, nodes);
             elastic.turning()
         });
+        self.expected.clear();
+        self.expected.resize(self.nodes.stride(), DVec3::ZERO);
+        for (node, force) in forces {
+            self.expected[self.nodes.slot(node)] += force;
+        }
+        self.turns.clear();
+        if let Some(turning) = turning {
+            self.turns.resize(self.nodes.stride(), [DMat3::ZERO; 2]);
+            for &node in nodes {
+                self.turns[self.nodes.slot(node)] = turning.coefficients(node);
+            }
+        }
         for corners in &mut self.contacts {
             for place in 0..corners.count as usize {
                 corners.slots[place] = self.nodes.slot(corners.nodes[place]) as u32;
             }
             if let Some(turning) = turning {
-                corners.set_turning(turning);
+                corners.set_turning(turning, &self.turns);
             }
         }
-        self.load(turning, nodes, forces);
-    }
-
-    fn load(
-        &mut self,
-        turning: Option<&Turning>,
-        nodes: &[u32],
-        forces: impl Iterator<Item = (u32, DVec3)>,
-    ) {
-        self.loads.clear();
-        self.loads.resize(self.nodes.stride(), Vec3::ZERO);
-        for (node, force) in forces {
-            self.loads[self.nodes.slot(node)] += force.as_vec3();
-        }
-        self.loaded.clear();
-        self.loaded.resize(self.moved_len(), 0.0);
-        let (moved, turn) = self.loaded.split_at_mut(3 * self.nodes.stride());
-        let loads = nodes.iter().map(|&node| (node, self.loads[self.nodes.slot(node)]));
-        for (node, load) in loads.clone().filter(|&(_, load)| load != Vec3::ZERO) {
-            let column = self.nodes.column(self.nodes.slot(node));
-            add_columns(&[(column, load)], moved);
-        }
-        if let Some(turning) = turning {
-            let loads = loads.map(|(node, load)| (node, load.as_dvec3()));
-            let [by, counter] = turning.coefficients(loads).map(|turn| turn.as_vec3().to_array());
-            turn[..3].copy_from_slice(&by);
-            turn[3..].copy_from_slice(&counter);
-        }
-    }
-
-    /// Displacement of a contact, in the frame, by the forces that were taken.
-    pub(super) fn displacement(&self, place: u32) -> DVec3 {
-        self.moved(place, &self.loaded).as_dvec3()
     }
 
     /// Response of a contact to itself, in the frame.
@@ -169,7 +151,7 @@ impl Coupling {
         for (slot, weight) in corners.slots() {
             for (other, other_weight) in corners.slots() {
                 let entries = self.nodes.entry(slot, other).map(f64::from);
-                sum += f64::from(weight * other_weight) * DMat3::from_cols_array(&entries);
+                sum += weight * other_weight * DMat3::from_cols_array(&entries);
             }
         }
         if corners.turns {
@@ -192,7 +174,7 @@ impl Coupling {
         let mut sum = Vec3::ZERO;
         for (slot, weight) in corners.slots() {
             let node = Vec3::new(moved[slot], moved[stride + slot], moved[2 * stride + slot]);
-            sum += weight * node;
+            sum += weight as f32 * node;
         }
         if corners.turns {
             let turn = &moved[3 * stride..][..TURN_LEN];
@@ -201,13 +183,45 @@ impl Coupling {
         sum
     }
 
+    /// Writes what the expected forces are beyond none at all, with the sign turned.
+    pub(super) fn begin_loads(&self, loads: &mut [DVec3]) {
+        for (load, expected) in loads.iter_mut().zip(&self.expected) {
+            *load = -*expected;
+        }
+    }
+
+    /// Adds a force on a contact to those on the slots.
+    pub(super) fn add_load(&self, place: u32, force: DVec3, loads: &mut [DVec3]) {
+        for (slot, weight) in self.contacts[place as usize].slots() {
+            loads[slot] += weight * force;
+        }
+    }
+
+    /// Adds to the displacements what the forces on the slots do, where they are not negligible.
+    pub(super) fn add_loads(&self, loads: &[DVec3], moved: &mut [f32]) {
+        let (moved, turn) = moved.split_at_mut(3 * self.nodes.stride());
+        let squares = self.expected.iter().chain(loads).map(|load| load.length_squared());
+        let limit = NEGLIGIBLE * NEGLIGIBLE * squares.fold(0.0, f64::max);
+        let mut turned = [DVec3::ZERO; 2];
+        for (slot, &load) in loads.iter().enumerate().filter(|(_, f)| f.length_squared() > limit) {
+            add_columns(&[(self.nodes.column(slot), load.as_vec3())], moved);
+            for (sum, turn) in turned.iter_mut().zip(self.turns.get(slot).into_iter().flatten()) {
+                *sum += *turn * load;
+            }
+        }
+        let turned = turned.into_iter().flat_map(|turn| turn.as_vec3().to_array());
+        for (sum, value) in turn.iter_mut().zip(turned) {
+            *sum += value;
+        }
+    }
+
     /// Adds to the displacements what `force` on a contact does.
     pub(super) fn add_force(&self, place: u32, force: Vec3, moved: &mut [f32]) {
         let corners = &self.contacts[place as usize];
         let (moved, turn) = moved.split_at_mut(3 * self.nodes.stride());
         let mut columns = [(&[][..], Vec3::ZERO); 4];
         for (column, (slot, weight)) in columns.iter_mut().zip(corners.slots()) {
-            *column = (self.nodes.column(slot), weight * force);
+            *column = (self.nodes.column(slot), weight as f32 * force);
         }
         add_columns(&columns[..corners.count as usize], moved);
         if corners.turns {

@@ -57,6 +57,8 @@ pub(crate) struct GaussSeidel {
     forces: Vec<DVec3>,
     /// Displacements by all forces, as [`Problem`] has them [m].
     moved: Vec<f32>,
+    /// Memory: forces on nodes.
+    loads: Vec<DVec3>,
     /// Contacts that a round dwells on.
     notable: Vec<u32>,
 }
@@ -86,7 +88,7 @@ impl GaussSeidel {
         self.forces.clear();
         let guesses = self.laws.iter().enumerate();
         self.forces.extend(guesses.map(|(index, law)| law.admissible(guess(index))));
-        self.update_moved(problem);
+        problem.find_moved(&self.forces, &mut self.loads, &mut self.moved);
         let mut cost = SolveCost::default();
         let budget = effort.changes * candidates.len() as f64;
         let mut violation = self.violation(problem);
@@ -98,16 +100,6 @@ impl GaussSeidel {
         }
         cost.residual = self.violation(problem);
         cost
-    }
-
-    fn update_moved(&mut self, problem: &Problem) {
-        self.moved.clear();
-        self.moved.resize(problem.moved_len(), 0.0);
-        for (block, force) in problem.blocks().iter().zip(&self.forces) {
-            if *force != DVec3::ZERO {
-                problem.add_force(block, force.as_vec3(), &mut self.moved);
-            }
-        }
     }
 
     /// Looks at all contacts and dwells on those that are farthest from their laws; `last` is the

@@ -1,6 +1,5 @@
 //! The contact forces of the last step: where the next solve begins and what motion to expect.
 
-use glam::DVec3;
 use palpate_contact::{PairKind, ProximityPair};
 
 use super::filter::Candidate;
@@ -17,6 +16,17 @@ pub(crate) struct LastForces {
 /// What tells contacts apart.
 fn key(force: &ContactForce) -> (bool, [u32; 2], [u32; 4]) {
     (force.edges, force.bodies, force.nodes)
+}
+
+impl Clone for LastForces {
+    fn clone(&self) -> Self {
+        Self { forces: self.forces.clone(), order: self.order.clone() }
+    }
+
+    fn clone_from(&mut self, other: &Self) {
+        self.forces.clone_from(&other.forces);
+        self.order.clone_from(&other.order);
+    }
 }
 
 impl LastForces {
@@ -38,10 +48,10 @@ impl LastForces {
         &self.forces
     }
 
-    /// Force on side a of a candidate [N]; zero if it did not touch.
-    pub(crate) fn force_of(&self, candidate: &Candidate) -> DVec3 {
+    /// The force of a candidate, if it touched.
+    pub(crate) fn of(&self, candidate: &Candidate) -> Option<&ContactForce> {
         let place = self.find(candidate.kind, candidate.bodies, candidate.nodes);
-        place.map_or(DVec3::ZERO, |place| DVec3::from_array(self.forces[place].force))
+        place.map(|place| &self.forces[place])
     }
 
     /// Whether a pair touched.

@@ -7,7 +7,9 @@
 //!
 //! W is never put together: contacts couple through the bodies that they share, each in its frame.
 
-use glam::{DMat3, DVec3, Mat3, Vec3};
+use std::ops::Range;
+
+use glam::{DMat3, DVec2, DVec3, Mat3, Vec3};
 use palpate_geometry::Point;
 use rayon::prelude::*;
 
@@ -17,6 +19,9 @@ use super::filter::Candidate;
 use super::node_compliance::NodeCompliance;
 use super::side;
 use crate::body::{ElasticBody, MovingBody};
+
+/// Contacts whose equations are worth a task of their own.
+const CONTACTS_PER_TASK: usize = 64;
 
 /// One of the deformable bodies that a contact is on.
 #[derive(Clone, Copy, Debug, Default)]
@@ -33,7 +38,7 @@ pub(super) struct Place {
 pub(crate) struct Block {
     /// Normal and two tangents, along which the contact's own response is uncoupled.
     pub(crate) axes: DMat3,
-    /// Relative displacement of the step along the axes without contact forces [m].
+    /// Relative displacement of the step along the axes under the expected contact forces [m].
     pub(crate) free: DVec3,
     /// Response of the contact to its own force, along the axes [m/N].
     pub(super) own: DMat3,
@@ -42,6 +47,28 @@ pub(crate) struct Block {
 }
 
 impl Block {
+    /// Writes the equations of a candidate whose places are known.
+    fn fill<'a>(
+        &mut self,
+        candidate: &Candidate,
+        bodies: &[BodyPart],
+        body: impl Fn(usize) -> &'a MovingBody,
+    ) {
+        let mut own = DMat3::ZERO;
+        for place in self.places() {
+            let coupling = &bodies[place.body as usize].coupling;
+            let frame = frame(body(place.body as usize));
+            own += frame * coupling.own(place.contact) * frame.transpose();
+        }
+        self.axes = principal_axes(candidate.normal, own);
+        self.own = self.axes.transpose() * own * self.axes;
+        self.free = self.axes.transpose() * expected_displacement(candidate, &body);
+        for place in &mut self.places[..self.place_count as usize] {
+            let axes = frame(body(place.body as usize)).transpose() * self.axes;
+            place.axes = axes.as_mat3();
+        }
+    }
+
     fn places(&self) -> &[Place] {
         &self.places[..self.place_count as usize]
     }
@@ -54,6 +81,7 @@ struct BodyPart {
     nodes: Vec<u32>,
     is_contact: Vec<bool>,
     coupling: Coupling,
+    to_frame: DMat3,
     /// Where the displacements of its contacts begin.
     first: usize,
 }
@@ -139,23 +167,16 @@ impl Problem {
             part.first = self.moved_len;
             self.moved_len += part.coupling.moved_len();
         }
-        for (block, candidate) in self.blocks.iter_mut().zip(candidates) {
-            let mut own = DMat3::ZERO;
-            let mut moved = expected_displacement(candidate, &body);
-            for place in &block.places[..block.place_count as usize] {
-                let moving = body(place.body as usize);
-                let coupling = &self.bodies[place.body as usize].coupling;
-                let frame = frame(moving);
-                own += frame * coupling.own(place.contact) * frame.transpose();
-                moved -= frame * coupling.displacement(place.contact);
-            }
-            block.axes = principal_axes(candidate.normal, own);
-            block.own = block.axes.transpose() * own * block.axes;
-            block.free = block.axes.transpose() * moved;
-            for place in &mut block.places[..block.place_count as usize] {
-                let axes = frame(body(place.body as usize)).transpose() * block.axes;
-                place.axes = axes.as_mat3();
-            }
+        let Self { bodies, blocks, .. } = self;
+        let fill = |(block, candidate): (&mut Block, &Candidate)| {
+            block.fill(candidate, bodies, &body);
+        };
+        match pool {
+            Some(pool) => pool.install(|| {
+                let each = blocks.par_iter_mut().zip(candidates).with_min_len(CONTACTS_PER_TASK);
+                each.for_each(fill);
+            }),
+            None => blocks.iter_mut().zip(candidates).for_each(fill),
         }
     }
 
@@ -202,12 +223,7 @@ impl Problem {
         &self.blocks
     }
 
-    /// Length of the array of displacements that [`Problem::moved`] reads.
-    pub(super) fn moved_len(&self) -> usize {
-        self.moved_len
-    }
-
-    /// Displacement of a contact along its axes [m].
+    /// Displacement of a contact along its axes beyond the expected one [m].
     pub(super) fn moved(&self, block: &Block, moved: &[f32]) -> Vec3 {
         let mut sum = Vec3::ZERO;
         for place in block.places() {
@@ -216,6 +232,35 @@ impl Problem {
             sum += place.axes.transpose() * own;
         }
         sum
+    }
+
+    /// Writes the displacements that forces along the axes of all contacts bring about beyond those of the
+    /// expected forces. `loads` is memory.
+    pub(super) fn find_moved(
+        &self,
+        forces: &[DVec3],
+        loads: &mut Vec<DVec3>,
+        moved: &mut Vec<f32>,
+    ) {
+        moved.clear();
+        moved.resize(self.moved_len, 0.0);
+        loads.clear();
+        loads.resize(self.moved_len / 3, DVec3::ZERO);
+        let parts = || self.bodies.iter().filter(|part| !part.nodes.is_empty());
+        for part in parts() {
+            part.coupling.begin_loads(&mut loads[part.slots()]);
+        }
+        for (block, &force) in self.blocks.iter().zip(forces).filter(|(_, f)| **f != DVec3::ZERO) {
+            for place in block.places() {
+                let part = &self.bodies[place.body as usize];
+                let force = part.to_frame * (block.axes * force);
+                part.coupling.add_load(place.contact, force, &mut loads[part.slots()]);
+            }
+        }
+        for part in parts() {
+            let moved = &mut moved[part.first..][..part.coupling.moved_len()];
+            part.coupling.add_loads(&loads[part.slots()], moved);
+        }
     }
 
     /// Adds to the displacements what a force along the axes of a contact does [N].
@@ -249,13 +294,22 @@ impl Problem {
         };
         let blocks = free.iter().enumerate().map(block).collect();
         let moved_len = coupling.moved_len();
-        Self { blocks, bodies: vec![BodyPart { coupling, ..BodyPart::default() }], moved_len }
+        let to_frame = DMat3::IDENTITY;
+        let nodes = (0..free.len() as u32).collect();
+        let part = BodyPart { coupling, nodes, to_frame, ..BodyPart::default() };
+        Self { blocks, bodies: vec![part], moved_len }
     }
 }
 
 impl BodyPart {
+    /// Where the slots of its nodes are among all.
+    fn slots(&self) -> Range<usize> {
+        self.first / 3..(self.first + self.coupling.moved_len()) / 3
+    }
+
     fn assemble(&mut self, body: &MovingBody) {
         let to_frame = frame(body).transpose();
+        self.to_frame = to_frame;
         let is_contact = &self.is_contact;
         let forces = body.expected_forces().filter(|&(node, _)| is_contact[node as usize]);
         let forces = forces.map(|(node, force)| (node, to_frame * force));
@@ -276,8 +330,11 @@ fn gives_way(body: &MovingBody, node: u32) -> bool {
 fn principal_axes(normal: DVec3, own: DMat3) -> DMat3 {
     let (first, second) = normal.any_orthonormal_pair();
     let (a, b, c) = (first.dot(own * first), second.dot(own * second), first.dot(own * second));
-    let angle = 0.5 * (2.0 * c).atan2(a - b);
-    let (sin, cos) = angle.sin_cos();
+    // By the angle whose double has the direction (a - b, 2 c).
+    let double = DVec2::new(a - b, 2.0 * c).normalize_or(DVec2::X);
+    let cos = (0.5 * (1.0 + double.x.abs())).sqrt();
+    let sin = 0.5 * double.y / cos;
+    let (sin, cos) = if double.x >= 0.0 { (sin, cos) } else { (cos.copysign(sin), sin.abs()) };
     DMat3::from_cols(normal, cos * first + sin * second, cos * second - sin * first)
 }
 

@@ -16,6 +16,10 @@ use crate::state::ContactForce;
 const CLOSE: f64 = 1.5;
 /// A pair that did not count was missed when it ends up closer than this, in contact distances.
 const MISSED: f64 = 0.75;
+/// Part by which the force of a contact differs from the last one where nothing has changed it, and the
+/// difference of weights, in edges, up to which it then goes on acting where it did.
+const SAME_FORCE: f64 = 1e-9;
+const SAME_PLACE: f64 = 1e-5;
 
 /// Contact detection to contact forces. Keeps its memory.
 #[derive(Default)]
@@ -77,7 +81,7 @@ impl Response {
             }
             close
         });
-        self.guess.restore(self.last.forces());
+        self.guess.clone_from(&self.last);
         self.problem.collect(&self.candidates, body_count, &body);
         self.contacts.clear();
     }
@@ -145,8 +149,8 @@ impl Response {
         self.problem.assemble(&self.candidates, pool, &body);
         let (problem, candidates, known) = (&self.problem, &self.candidates, &self.guess);
         let guess = |index: usize| {
-            let force = known.force_of(&candidates[index]);
-            problem.blocks()[index].axes.transpose() * force
+            let force = known.of(&candidates[index]).map_or([0.0; 3], |known| known.force);
+            problem.blocks()[index].axes.transpose() * DVec3::from_array(force)
         };
         let cost = self.solver.solve(problem, candidates, Effort::default(), guess);
         self.report(body);
@@ -158,13 +162,16 @@ impl Response {
         self.forces.clear();
         for (index, (candidate, block)) in self.candidates.iter().zip(blocks).enumerate() {
             let force = self.solver.force(index);
-            let mut found = ContactForce {
+            let found = ContactForce {
                 edges: candidate.kind == PairKind::EdgeEdge,
                 bodies: candidate.bodies,
                 nodes: candidate.nodes,
                 weights: candidate.weights,
                 force: (block.axes * force).to_array(),
             };
+            // What nothing has changed stays the same bits: bodies at rest need not be solved for.
+            let known = self.guess.of(candidate).filter(|known| is_same(known, &found));
+            let found = *known.unwrap_or(&found);
             if candidate.tied.is_some() {
                 self.forces.push(found);
                 continue;
@@ -178,21 +185,22 @@ impl Response {
                 let position = moving.positions[candidate.nodes[corner] as usize];
                 point += 0.5 * candidate.weights[corner].abs() * DVec3::from_array(position);
             }
-            let friction = block.axes * DVec3::new(0.0, force.y, force.z);
+            let total = DVec3::from_array(found.force);
+            let normal_force = candidate.normal.dot(total);
+            let friction = total - normal_force * candidate.normal;
             let contact = Contact {
                 kind: candidate.kind,
                 bodies: candidate.bodies,
                 nodes: candidate.nodes,
-                weights: candidate.weights,
+                weights: found.weights,
                 normal: candidate.normal.to_array(),
                 point: point.to_array(),
                 gap: candidate.gap - candidate.offset
                     + block.free.x
                     + self.solver.moved(&self.problem, block).x,
-                normal_force: force.x,
+                normal_force,
                 friction_force: friction.to_array(),
             };
-            found.force = contact.force();
             self.forces.push(found);
             self.contacts.push(contact);
         }
@@ -224,4 +232,12 @@ impl Response {
         self.contacts.clear();
         self.last.restore(forces);
     }
+}
+
+/// Whether a contact has the force that it had, in the same place.
+fn is_same(known: &ContactForce, found: &ContactForce) -> bool {
+    let (a, b) = (DVec3::from_array(known.force), DVec3::from_array(found.force));
+    let weights = known.weights.iter().zip(&found.weights);
+    (a - b).length_squared() <= SAME_FORCE * SAME_FORCE * b.length_squared()
+        && weights.map(|(a, b)| (a - b).abs()).all(|difference| difference <= SAME_PLACE)
 }

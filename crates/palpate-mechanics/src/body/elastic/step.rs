@@ -28,8 +28,6 @@ pub(super) struct Step {
     pub(super) force: Vec<[f64; 3]>,
     /// Correction of the free nodes in the frame [m].
     pub(super) correction: Vec<[f64; 3]>,
-    /// Response of the free nodes in the frame to the contact forces that are expected [m].
-    expected: Vec<[f64; 3]>,
     /// Response to the change of contact forces [m].
     pub(super) response: Vec<[f64; 3]>,
     /// Rotations of the predicted positions of an unattached body.
@@ -63,7 +61,6 @@ impl Step {
             strain: vec![[0.0; 3]; node_count],
             force: vec![[0.0; 3]; node_count],
             correction: vec![[0.0; 3]; free_count],
-            expected: vec![[0.0; 3]; free_count],
             response: vec![[0.0; 3]; free_count],
             rotations: Rotations::default(),
             turns: false,
@@ -126,7 +123,7 @@ impl ElasticBody {
         self.elasticity = elasticity;
     }
 
-    /// Finds the correction with the linear law, and the response to the expected contact forces.
+    /// Finds the correction with the linear law, the response to the expected contact forces included.
     fn correct_linear(
         &mut self,
         stiffness: &BlockMatrix,
@@ -136,19 +133,23 @@ impl ElasticBody {
     ) {
         self.load_elastic(stiffness, forces);
         let mut correction = std::mem::take(&mut self.step.correction);
-        let mut expected = std::mem::take(&mut self.step.expected);
+        let mut torque = DVec3::ZERO;
         if let Some(contact) = contact {
+            // Zero at the start of a step: memory for loads.
+            let mut expected = std::mem::take(&mut self.step.response);
             self.load(&mut expected, contact);
-            let torque = self.balance(&mut expected);
-            self.solve(&mut correction, Some(&mut expected));
-            self.turn(torque, &mut expected);
-        } else {
-            expected.fill([0.0; 3]);
-            self.solve(&mut correction, None);
+            torque = self.balance(&mut expected);
+            for (sum, load) in correction.iter_mut().zip(&mut expected) {
+                *sum = std::array::from_fn(|k| sum[k] + load[k]);
+                *load = [0.0; 3];
+            }
+            self.step.response = expected;
         }
-        (self.step.correction, self.step.expected) = (correction, expected);
+        self.solve(&mut correction);
+        self.step.correction = correction;
         if self.is_unattached() {
-            self.remove_torque(self.next_spin(x, forces, &[]));
+            let turned = self.step.frame * (self.gain() / self.time_step * torque);
+            self.remove_torque(self.next_spin(x, forces, &[]) + turned);
         }
     }
 
@@ -302,7 +303,7 @@ impl ElasticBody {
     /// by what its inertia says.
     pub(super) fn respond_to(&mut self, loads: &mut [[f64; 3]]) {
         let torque = self.balance(loads);
-        self.solve(loads, None);
+        self.solve(loads);
         self.turn(torque, loads);
     }
 
@@ -327,10 +328,9 @@ impl ElasticBody {
     /// Displacement of the free nodes from the prediction.
     pub(super) fn corrections(&self) -> impl Iterator<Item = (usize, DVec3)> {
         let step = &self.step;
-        let parts = step.correction.iter().zip(&step.expected).zip(&step.response);
-        self.free_nodes.iter().zip(parts).map(|(&node, ((&a, &b), &c))| {
-            let sum = DVec3::from_array(a) + DVec3::from_array(b) + DVec3::from_array(c);
-            (node as usize, step.frame * sum)
+        let parts = step.correction.iter().zip(&step.response);
+        self.free_nodes.iter().zip(parts).map(|(&node, (&a, &b))| {
+            (node as usize, step.frame * (DVec3::from_array(a) + DVec3::from_array(b)))
         })
     }
 
