@@ -9,7 +9,7 @@ SOURCES := pyproject.toml Cargo.toml Cargo.lock $(shell find crates -name '*.rs'
 CRATES := --workspace --exclude palpate-python
 
 .DEFAULT_GOAL := help
-.PHONY: help install run view test test-rust test-python soak soak-mechanics lint format bench docs wheel models three clean
+.PHONY: help install run view test test-rust test-python soak soak-mechanics fuzz lint format bench docs wheel models three clean
 
 help: ## Show this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /\1\t/' | expand -t 14
@@ -44,6 +44,14 @@ soak: ## Compare with the double loop on fresh random scenes for MINUTES (10)
 
 soak-mechanics: install ## Pull at the organs of case 2 at random for MINUTES (10)
 	$(BIN)/python -m palpate.bench.verification.soak $(or $(MINUTES),10) $(SEED)
+
+FUZZ := language seg vtk blade checkpoint scene simulation
+
+fuzz: ## Throw mutated input at each reader and at the calls for SECONDS (60); SEED= repeats
+	cargo build --release --locked -p palpate-fuzz
+	@failed=0; for target in $(FUZZ); do \
+		$${CARGO_TARGET_DIR:-target}/release/palpate-fuzz $$target $(or $(SECONDS),60) $(SEED) || failed=1; \
+	done; exit $$failed
 
 bench: ## Time each stage of detection; count its instructions with valgrind
 	cargo bench --locked -p palpate-contact --bench stages

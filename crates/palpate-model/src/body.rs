@@ -4,6 +4,7 @@ mod attachment;
 mod change;
 mod material;
 mod pose;
+mod structure;
 mod validate;
 
 use std::path::PathBuf;
@@ -19,6 +20,7 @@ use crate::mesh::Mesh;
 pub use attachment::{AttachedNode, Attachment, AttachmentError, triangle_axes};
 pub use material::{Law, Material};
 pub use pose::{Pose, PoseParts};
+pub use structure::Structure;
 pub use validate::BodyError;
 
 /// Everything a model file describes, loaded and placed.
@@ -59,22 +61,6 @@ impl Model {
     /// The model in canonical text; `None` when it came from arrays.
     pub fn to_text(&self) -> Option<String> {
         self.document.as_ref().map(Document::to_text)
-    }
-}
-
-/// The upper binary tree: connection elements (CE) down to the bodies (NE).
-#[derive(Clone, Debug, PartialEq, Eq, Deserialize, Serialize)]
-pub enum Structure {
-    /// A body, by its index in [`Model::bodies`].
-    Body(usize),
-    /// A connection element with its two subtrees; more than two children become a chain.
-    Join(Box<Structure>, Box<Structure>),
-}
-
-impl Structure {
-    /// Joins subtrees two by two from the left, a, b, c to ((a b) c); `None` of nothing.
-    pub fn chain(children: impl IntoIterator<Item = Self>) -> Option<Self> {
-        children.into_iter().reduce(|left, right| Self::Join(Box::new(left), Box::new(right)))
     }
 }
 

@@ -13,7 +13,7 @@ use grid::box_data;
 use insta::assert_snapshot;
 use palpate_model::{
     Body, BodyError, CoreLoader, Document, Law, LoadError, Mesh, MeshData, MeshLoader, Model,
-    ReadMesh, ReadOptions, Structure, load_model, write_mesh,
+    ReadMesh, ReadOptions, Structure, load_model, write_mesh, write_model,
 };
 use tempfile::TempDir;
 
@@ -412,4 +412,26 @@ TREE up{ ME{ trans 0,0,2 } NE a.seg FX{ box 0,0,0 2,0,0 } } AT{ join up low } }"
     );
     let nodes: Vec<u32> = model.attachments[0].ties.iter().map(|tie| tie.node).collect();
     assert_eq!(nodes, (3..9).collect::<Vec<_>>());
+}
+
+#[test]
+fn a_model_of_many_bodies_is_written_so_that_it_can_be_read() {
+    // Nested two by two they would be deeper than a text may be.
+    let mesh = Arc::new(loader().mesh);
+    let body = |index: usize| Body::new(format!("body {index}"), Arc::clone(&mesh));
+    let mut model = Model::from_bodies((0..90).map(body).collect());
+    let last = Structure::Body(89);
+    let rest = Structure::chain((0..89).map(Structure::Body)).unwrap();
+    model.structure = Structure::Join(Box::new(last), Box::new(rest));
+    let folder = TempDir::new().unwrap();
+    let path = folder.path().join("many.bml");
+    write_model(&path, &model).unwrap();
+    let read = load_model(&path, &CoreLoader).unwrap();
+    let names = |model: &Model| -> Vec<String> {
+        model.bodies.iter().map(|body| body.name.clone()).collect()
+    };
+    assert_eq!(names(&read)[1..], names(&model)[..89]);
+    let first = Structure::Body(0);
+    let rest = Structure::chain((1..90).map(Structure::Body)).unwrap();
+    assert_eq!(read.structure, Structure::Join(Box::new(first), Box::new(rest)));
 }

@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 use crate::simulation::{Simulation, SimulationError, SimulationOptions, Snapshot};
 
 const MAGIC: [u8; 8] = *b"palpate\n";
-const VERSION: u32 = 4;
+const VERSION: u32 = 5;
 const HEADER: usize = 8 + 4 + 8 + 4;
 
 /// Why a checkpoint could not be written or read.

@@ -91,11 +91,23 @@ fn mesh_of(body: &Body) -> Result<Mesh, MeshError> {
 fn block(structure: &Structure, model: &Model, file: &dyn Fn(usize) -> String) -> Block {
     match structure {
         Structure::Body(body) => Block::Tree(Box::new(tree(&model.bodies[*body], file(*body)))),
-        Structure::Join(left, right) => Block::Branch(Box::new(Branch {
-            children: [left, right].map(|part| block(part, model, file)).into(),
+        // A chain of joins is one branch: nested ones would be deeper than a text may be.
+        Structure::Join(..) => Block::Branch(Box::new(Branch {
+            children: chained(structure).map(|part| block(part, model, file)).collect(),
             ..Branch::default()
         })),
     }
+}
+
+/// What [`Structure::chain`] made the structure of.
+fn chained(mut structure: &Structure) -> impl Iterator<Item = &Structure> {
+    let mut last = Vec::new();
+    while let Structure::Join(left, right) = structure {
+        last.push(right.as_ref());
+        structure = left;
+    }
+    last.push(structure);
+    last.into_iter().rev()
 }
 
 fn tree(body: &Body, file: String) -> Tree {
