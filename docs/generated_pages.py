@@ -32,7 +32,7 @@ def _commands(command: Any, path: str) -> list[tuple[str, Any]]:
 
 def _prose(text: str) -> str:
     """A docstring in Markdown: its examples in one block."""
-    text = inspect.cleandoc(text)
+    text = inspect.cleandoc(text).replace("\\[", "[")  # escaped for the terminal
     examples = re.findall(r"^Example: (.*)$", text, re.MULTILINE)
     prose = re.sub(r"\n*^Example: .*$", "", text, flags=re.MULTILINE)
     prose = re.sub(r"--[a-z-]+", r"`\g<0>`", prose)
@@ -44,7 +44,7 @@ def _usage(path: str, command: Any) -> str:
     words = []
     for each in arguments:
         name = each.metavar or each.name.upper()
-        words.append(name if each.required or name.startswith("[") else f"[{name}]")
+        words.append(name if each.required else f"[{name}]" + "..." * (each.nargs == -1))
     return " ".join([path, "[OPTIONS]", *words])
 
 

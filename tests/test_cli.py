@@ -63,6 +63,10 @@ def test_help_shows_an_example(command):
     assert "--json" in out
 
 
+def test_help_names_the_extras():
+    assert "pip install 'palpate[mesh]'" in " ".join(run("mesh", "--help")[0].split())
+
+
 def test_help_names_every_command_and_version_prints_it():
     out, _ = run("--help")
     assert all(command in out for command in COMMANDS)

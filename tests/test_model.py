@@ -137,6 +137,15 @@ def test_a_model_from_arrays(cube):
         model.to_text()
 
 
+def test_names_are_made_unique(cube):
+    bodies = [palpate.Body(cube), cube, palpate.Body(cube), palpate.Body(cube, name="body_2")]
+    names = ["body", "body_2", "body_3", "body_2_2"]
+    assert [body.name for body in palpate.Model(bodies).bodies] == names
+    assert list(palpate.Scene(bodies).names) == names
+    assert palpate.Simulation(bodies).model.body_index("body_3") == 2
+    assert bodies[2].name == "body"
+
+
 @pytest.mark.parametrize(
     ("body", "text"),
     [

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -192,7 +192,8 @@ class Model:
     Parameters
     ----------
     bodies : iterable of Body or Mesh
-        At least one. Names are made unique with ``_2``, ``_3``.
+        At least one. Names are made unique with ``_2``, ``_3``; a mesh alone is ``body_1`` and so
+        on.
     gravity : three numbers
         [m/s²]
     attachments : iterable of Attachment
@@ -218,8 +219,9 @@ class Model:
                     f"bodies[{index}]: expected a palpate.Body or palpate.Mesh, "
                     f"got {type(item).__name__}"
                 )
-            cores.append(item._to_core())
-            names.append(str(item.name))
+            name = unique_name(str(item.name), names)
+            cores.append((item if name == item.name else replace(item, name=name))._to_core())
+            names.append(name)
         ties = []
         for index, each in enumerate(attachments):
             if not isinstance(each, Attachment):
@@ -287,6 +289,15 @@ class Model:
     def __repr__(self) -> str:
         names = ", ".join(body.name for body in self.bodies)
         return f"Model({len(self.bodies)} bodies: {names})"
+
+
+def unique_name(name: str, names: Sequence[str]) -> str:
+    """The name, with ``_2``, ``_3`` and so on where it is among ``names`` already."""
+    candidate, number = name, 1
+    while candidate in names:
+        number += 1
+        candidate = f"{name}_{number}"
+    return candidate
 
 
 def body_index(names: Sequence[str], body: int | str) -> int:

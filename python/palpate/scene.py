@@ -21,7 +21,7 @@ from palpate.contacts import (
 )
 from palpate.cutting import Blade, BodyCut, MeshChange, as_blade, chosen, cut_options
 from palpate.mesh import Mesh, as_mesh
-from palpate.model import Body, Model, body_index, read_model
+from palpate.model import Body, Model, body_index, read_model, unique_name
 
 #: Ways to find the touching triangles; all give the same pairs.
 METHODS = ("wide", "paper", "all-pairs", "hash")
@@ -105,7 +105,7 @@ class Scene:
         index = self._core.add(mesh._core)
         self._meshes.append(mesh)
         default = body.name if isinstance(body, Body) else f"body_{index + 1}"
-        self._names.append(_unique(name or default, self._names))
+        self._names.append(unique_name(name or default, self._names))
         return index
 
     @overload
@@ -455,14 +455,6 @@ def _choice(value: Any, name: str, allowed: Sequence[str]) -> str:
     return str(value)
 
 
-def _unique(name: str, names: Sequence[str]) -> str:
-    candidate, number = name, 1
-    while candidate in names:
-        number += 1
-        candidate = f"{name}_{number}"
-    return candidate
-
-
 def _scene_parts(bodies: Any) -> tuple[list[Mesh], list[str], Any]:
     if isinstance(bodies, (str, os.PathLike)):
         bodies = read_model(bodies)
@@ -476,5 +468,5 @@ def _scene_parts(bodies: Any) -> tuple[list[Mesh], list[str], Any]:
         mesh = item.mesh if isinstance(item, Body) else as_mesh(item, f"bodies[{index}]")
         name = item.name if isinstance(item, Body) else f"body_{index + 1}"
         meshes.append(mesh)
-        names.append(_unique(name, names))
+        names.append(unique_name(name, names))
     return meshes, names, None

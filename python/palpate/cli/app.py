@@ -24,7 +24,8 @@ from palpate.cli.view import view
 app = typer.Typer(
     name="palpate",
     help="Contact detection and deformation of soft bodies made of tetrahedra.",
-    epilog="A MODEL is a .bml file or the name of a bundled one, such as small or case1.",
+    epilog="A MODEL is a .bml file, or one that comes with palpate: small, case1, case2. "
+    "palpate COMMAND --help tells what a command takes.",
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,

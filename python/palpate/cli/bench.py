@@ -30,7 +30,7 @@ from palpate.model import Model
 ModelsArgument = Annotated[
     list[str] | None,
     typer.Argument(
-        metavar="[MODEL]...",
+        metavar="MODEL",
         help="Models to measure; the paper's two cases if none is named.",
         show_default=False,
     ),
@@ -129,7 +129,8 @@ def bench_scaling(
     frames: FramesOption = 12,
     repeats: RepeatsOption = 5,
     bearable: Annotated[
-        float, typer.Option(min=0, help="Longest frame [s]; slower methods are left out.")
+        float,
+        typer.Option(min=0, help="Seconds of the longest frame; slower methods are left out."),
     ] = 0.5,
     output: Annotated[Path, _output_option("scaling")] = Path("out/bench/scaling"),
     draw: PlotsOption = True,
@@ -203,9 +204,9 @@ def bench_peers(
     draw: PlotsOption = True,
     json_output: JsonOption = False,
 ) -> None:
-    """Measure palpate beside other libraries and compare their answers, pair by pair.
+    r"""Measure palpate beside other libraries and compare their answers, pair by pair.
 
-    What is missing is named, with how to get it: pip install 'palpate[peers]' for the Python
+    What is missing is named, with how to get it: pip install 'palpate\[peers]' for the Python
     packages; parry3d and Embree need a checkout and cargo. Writes results.json, peers.csv,
     report.md and a plot.
 
@@ -260,9 +261,7 @@ def bench_peers(
 def bench_realtime(
     models: Annotated[
         list[str] | None,
-        typer.Argument(
-            metavar="[MODEL]...", help="Models; case2 unless given.", show_default=False
-        ),
+        typer.Argument(metavar="MODEL", help="Models; case2 unless given.", show_default=False),
     ] = None,
     law: Annotated[
         list[str] | None,

@@ -58,7 +58,12 @@ def mesh(
     ] = None,
     edge_length: Annotated[
         float | None,
-        typer.Option("--edge-length", parser=parse_length, metavar="LENGTH", help="Instead: 4mm."),
+        typer.Option(
+            "--edge-length",
+            parser=parse_length,
+            metavar="LENGTH",
+            help="Mean length of an edge instead, such as 4mm.",
+        ),
     ] = None,
     tolerance: Annotated[
         float | None,
@@ -80,10 +85,11 @@ def mesh(
     ] = False,
     json_output: JsonOption = False,
 ) -> None:
-    """Fill a closed surface, or a label of a segmented image, with tetrahedra.
+    r"""Fill a closed surface, or a label of a segmented image, with tetrahedra.
 
-    Needs palpate[mesh]. The mesher is fTetWild: any closed surface will do, also one of many thin
-    triangles that cross. Steps between the voxels of an image are smoothed within a voxel.
+    Needs pip install 'palpate\[mesh]'. The mesher is fTetWild: any closed surface will do, also
+    one of many thin triangles that cross. Steps between the voxels of an image are smoothed within
+    a voxel.
 
     Example: palpate mesh organ.stl organ.seg --unit mm --nodes 2500
 

@@ -40,7 +40,12 @@ RepairOption = Annotated[
 ]
 LeafSizeOption = Annotated[
     int | None,
-    typer.Option("--leaf-size", "-K", min=1, help="Most tetrahedra in a leaf (the paper's K)."),
+    typer.Option(
+        "--leaf-size",
+        "-K",
+        min=1,
+        help="Most tetrahedra in a leaf of the bounding tree (the paper's K).",
+    ),
 ]
 ThreadsOption = Annotated[int, typer.Option("--threads", min=1, help="Worker threads.")]
 

@@ -54,7 +54,10 @@ def render(
     ] = None,
     width: Annotated[int, typer.Option(min=64, max=8192, help="Pixels of one picture.")] = 1280,
     time_step: Annotated[
-        float, typer.Option(parser=parse_seconds, metavar="SECONDS", help="Length of a step.")
+        float,
+        typer.Option(
+            parser=parse_seconds, metavar="SECONDS", help="Length of a step.", show_default="1/60"
+        ),
     ] = 1 / 60,
     threads: ThreadsOption = 1,
 ) -> None:

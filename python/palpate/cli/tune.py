@@ -26,7 +26,9 @@ def tune(
     model: ModelArgument,
     threads: ThreadsOption = 1,
     frames: Annotated[int, typer.Option(min=2, help="Frames of the motion tried.")] = 6,
-    repeats: Annotated[int, typer.Option(min=1, help="Passes of those that come far.")] = 9,
+    repeats: Annotated[
+        int, typer.Option(min=1, help="Passes over the motion for the fastest.")
+    ] = 9,
     show: Annotated[int, typer.Option(min=1, help="Rows to show.")] = 10,
     json_output: JsonOption = False,
 ) -> None:

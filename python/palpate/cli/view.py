@@ -24,7 +24,10 @@ def view(
         ),
     ],
     host: Annotated[
-        str, typer.Option(help="Address to listen on; other machines reach only their own.")
+        str,
+        typer.Option(
+            help="Address to listen on; 0.0.0.0 lets other machines in, without a password."
+        ),
     ] = "127.0.0.1",
     port: Annotated[
         int, typer.Option(min=0, max=65535, help="Another one is taken when this is in use.")
@@ -34,7 +37,10 @@ def view(
     ] = False,
     paused: Annotated[bool, typer.Option("--paused", help="Wait for the play button.")] = False,
     time_step: Annotated[
-        float, typer.Option(parser=parse_seconds, metavar="SECONDS", help="Length of a step.")
+        float,
+        typer.Option(
+            parser=parse_seconds, metavar="SECONDS", help="Length of a step.", show_default="1/60"
+        ),
     ] = 1 / 60,
     threads: ThreadsOption = 1,
     leaf_size: LeafSizeOption = None,
