@@ -514,6 +514,18 @@ def test_a_stroke_cuts_and_undo_mends(viewer):
     assert len(viewer.arrays("scene")["triangles/2"]) > len(whole["triangles/2"])
     assert np.array_equal(viewer.arrays("scene")["triangles/3"], whole["triangles/3"])
     assert viewer.header("state")["undo"] == 1
+    inner = viewer.arrays("scene")["cut/2"]
+    assert "cut/3" not in viewer.arrays("scene")
+    # The surface that was there has kept its area; the two lips are alike.
+    rest, triangles = (viewer.arrays("scene")[f"{name}/2"] for name in ("rest", "triangles"))
+    a, b, c = np.moveaxis(rest[triangles].astype(np.float64), 1, 0)
+    areas = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
+    outer = whole["rest/2"][whole["triangles/2"]].astype(np.float64)
+    crosses = np.cross(outer[:, 1] - outer[:, 0], outer[:, 2] - outer[:, 0])
+    assert areas[inner == 0].sum() == pytest.approx(np.linalg.norm(crosses, axis=1).sum() / 2)
+    assert inner.sum() % 2 == 0
+    told = re.search(r"upper: ([0-9.]+) cm²", viewer.header("notice")["text"])
+    assert areas[inner == 1].sum() == pytest.approx(2e-4 * float(told[1]), rel=0.05)
     viewer.send({"type": "step", "count": 5})
     assert np.isfinite(viewer.arrays("frame")["positions"]).all()
     viewer.send({"type": "separate"})

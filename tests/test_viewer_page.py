@@ -224,11 +224,14 @@ def test_tissue_is_cut_and_mended(page):
     page.mouse("mousePressed", x - 110, y)
     for step in range(12):
         page.mouse("mouseMoved", x - 110 + 20 * step, y + step)
+    page.wait("document.querySelector('#stroke polyline').points.length > 3")
     page.mouse("mouseReleased", x + 110, y + 11)
     page.wait("palpate.state.undo === 1")
+    assert page.run("document.querySelector('#stroke polyline').points.length") == 0
     page.wait(f"palpate.stage.triangleCount > {triangles}")
     page.wait("/cm² cut/.test(document.getElementById('toasts').textContent)")
     page.wait("palpate.last.header.version === palpate.version")
+    page.wait("palpate.stage.bodies[2].inside?.some((each) => each === 1)")
     page.key("z")
     page.wait(f"palpate.state.undo === 0 && palpate.stage.triangleCount === {triangles}")
 

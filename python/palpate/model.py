@@ -210,7 +210,8 @@ class Model:
         attachments: Iterable[Attachment] = (),
     ) -> None:
         items = [bodies] if isinstance(bodies, (Body, Mesh)) else list(bodies)
-        cores, names = [], []
+        cores: list[_core.Body] = []
+        names: list[str] = []
         for index, item in enumerate(items):
             if isinstance(item, Mesh):
                 item = Body(item, name=f"body_{index + 1}")

@@ -23,7 +23,7 @@ from palpate.viewer.editing import edited, settings_of, transferred
 from palpate.viewer.hands import Hands
 from palpate.viewer.player import Outcome, Player, Wishes
 from palpate.viewer.protocol import Command, encode, finite
-from palpate.viewer.surface import Surfaces, deformation
+from palpate.viewer.surface import Surfaces, deformation, inner_triangles
 
 #: Seconds between two counts of the tested triangle pairs while nobody looks at them closely.
 _COUNT_INTERVAL = 0.5
@@ -43,6 +43,8 @@ class LivePlayer(Player):
         self._start = simulation.model
         self._remade = False
         self._passed = 0.0
+        #: The bodies before cuts, to tell what a blade laid open.
+        self._whole = {body.name: body.mesh for body in simulation.model.bodies}
         self._surfaces = Surfaces([body.mesh for body in simulation.model.bodies])
         self._version = 0
         self._sent = -1
@@ -85,6 +87,9 @@ class LivePlayer(Player):
             seen = body.mesh.nodes[self._surfaces.nodes[index]]
             arrays[f"rest/{index}"] = seen.astype(np.float32)
             arrays[f"triangles/{index}"] = self._surfaces.triangles[index]
+            whole = self._whole.get(body.name.split("/")[0])  # pieces are named kidney/2
+            if whole is not None and len(body.mesh.tetrahedra) != len(whole.tetrahedra):
+                arrays[f"cut/{index}"] = inner_triangles(body.mesh, whole)
         return encode(
             "scene",
             {

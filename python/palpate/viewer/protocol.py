@@ -11,7 +11,8 @@ padded with blanks so that what follows is aligned to four; then the arrays that
 ``scene``
     Topology, sent when it changes: ``version``, ``bodies`` (name, look, settings, counts), ``up``,
     ``bounds``; for body i the arrays ``rest/i`` (n, 3) [m] float32, its surface nodes where they
-    started, and ``triangles/i`` (m, 3) uint32, rows of them.
+    started, ``triangles/i`` (m, 3) uint32, rows of them, and where a blade went through it
+    ``cut/i`` (m,) uint8, 1 for the surface that it made.
 ``state``
     What the controls show: ``playing``, ``speed``, ``time_step``, ``gravity``, ``undo``, ...
 ``frame``

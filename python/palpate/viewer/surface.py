@@ -9,6 +9,10 @@ import numpy.typing as npt
 
 from palpate._arrays import Float64Array
 from palpate.mesh import Mesh
+from palpate.scene import Scene
+
+#: In sizes of the body: what is closer to its surface is on it.
+_ROUNDING = 1e-7
 
 
 class Surfaces:
@@ -85,3 +89,10 @@ def deformation(rest: Float64Array, positions: Float64Array) -> Float64Array:
     rotation = (left * np.array([1.0, 1.0, turn])) @ right
     off: Float64Array = np.linalg.norm(after - before @ rotation, axis=1)
     return off
+
+
+def inner_triangles(mesh: Mesh, whole: Mesh) -> npt.NDArray[np.uint8]:
+    """1 for surface triangles that were inside the ``whole`` mesh, which was cut, else 0; (m,)."""
+    middles = mesh.nodes[mesh.triangles].mean(axis=1)
+    size = float(np.linalg.norm(np.ptp(whole.nodes, axis=0)))
+    return (Scene([whole]).closest(middles).distances > _ROUNDING * size).astype(np.uint8)

@@ -5,11 +5,13 @@ import { rampIndex } from "palpate/colors";
 
 /** Cosine of the angle between neighbours from which an edge is drawn sharp. */
 const CREASE = 0.6;
+/** What is seen inside of a body. */
+const FLESH = new Color().setRGB(0.96, 0.8, 0.74, SRGBColorSpace);
 
 export class BodyMesh extends Mesh {
-  /** `plain`: light that costs little; `start` is the row of the body's first node in a frame's positions, `firstTriangle` likewise. */
-  constructor(look, plain, rest, triangles, start, firstTriangle) {
-    const { origin, index } = split(rest, triangles);
+  /** `plain`: light that costs little; `cut`: 1 for triangles that a blade made, or undefined; `start` is the row of the body's first node in a frame's positions, `firstTriangle` likewise. */
+  constructor(look, plain, rest, triangles, cut, start, firstTriangle) {
+    const { origin, index } = split(rest, triangles, cut);
     const geometry = new BufferGeometry();
     for (const name of ["position", "normal"]) {
       const attribute = new BufferAttribute(new Float32Array(3 * origin.length), 3);
@@ -22,8 +24,12 @@ export class BodyMesh extends Mesh {
     this.frustumCulled = false;
     this.castShadow = look.opacity > 0.6;
     this.receiveShadow = true;
+    // Which vertices belong to the surface of a cut.
+    this.inside = cut?.some(Boolean) ? new Uint8Array(origin.length) : null;
+    if (this.inside) index.forEach((vertex, corner) => (this.inside[vertex] = cut[Math.floor(corner / 3)]));
     this.renderOrder = look.opacity < 1 ? 1 : 0;
     this.move(rest, 0);
+    this.paint(null);
   }
 
   /** Put the nodes where rows `start` and on of `positions` say. */
@@ -43,29 +49,39 @@ export class BodyMesh extends Mesh {
     this.geometry.boundingSphere = null;
   }
 
-  /** Colour by values of the frame's nodes, from 0 to `high`; null: the body's own colour. */
+  /** Colour by values of the frame's nodes, from 0 to `high`; null: the body's own colour, flesh where it was cut. */
   paint(values, high, colors) {
-    const painted = values !== null;
-    if (painted) {
-      let attribute = this.geometry.attributes.color;
-      if (!attribute) {
-        attribute = new BufferAttribute(new Float32Array(3 * this.origin.length), 3);
-        this.geometry.setAttribute("color", attribute.setUsage(DynamicDrawUsage));
-      }
-      const { array } = attribute;
+    const painted = values !== null || this.inside !== null;
+    if (values !== null) {
+      const { array } = this.vertexColors();
       for (let i = 0, j = 0; i < this.origin.length; i++, j += 3) {
         const at = rampIndex(values[this.start + this.origin[i]] / high);
         array[j] = colors[at];
         array[j + 1] = colors[at + 1];
         array[j + 2] = colors[at + 2];
       }
-      attribute.needsUpdate = true;
+    } else if (this.inside) {
+      const { array } = this.vertexColors();
+      const [outer, inner] = [this.tint, this.tint.lerp(FLESH, 0.6)].map((color) => color.toArray());
+      this.inside.forEach((inside, i) => array.set(inside ? inner : outer, 3 * i));
     }
     if (this.material.vertexColors !== painted) {
       this.material.vertexColors = painted;
       this.material.needsUpdate = true;
     }
     this.material.color.copy(painted ? new Color(1, 1, 1) : this.tint);
+    this.colored = values !== null;
+  }
+
+  /** The colours of the vertices, to be written. */
+  vertexColors() {
+    let attribute = this.geometry.attributes.color;
+    if (!attribute) {
+      attribute = new BufferAttribute(new Float32Array(3 * this.origin.length), 3);
+      this.geometry.setAttribute("color", attribute.setUsage(DynamicDrawUsage));
+    }
+    attribute.needsUpdate = true;
+    return attribute;
   }
 
   get tint() {
@@ -76,7 +92,7 @@ export class BodyMesh extends Mesh {
   restyle({ color, opacity, wireframe }) {
     if (color !== undefined) this.look.color = color;
     const { material } = this;
-    if (!material.vertexColors) material.color.copy(this.tint);
+    if (!this.colored) this.paint(null);
     if (opacity !== undefined) {
       this.look.opacity = opacity;
       material.opacity = opacity;
@@ -134,9 +150,9 @@ function smoothNormals(positions, index, normals) {
 
 /**
  * One vertex per node and smooth group of triangles around it. Triangles at a node are of one group
- * when a chain of them leads from one to the other without a crease.
+ * when a chain of them leads from one to the other without a crease, or the rim of a cut.
  */
-export function split(rest, triangles) {
+export function split(rest, triangles, cut) {
   const count = triangles.length / 3;
   const normals = new Float32Array(triangles.length);
   for (let t = 0; t < count; t++) {
@@ -153,6 +169,7 @@ export function split(rest, triangles) {
   const index = new Uint32Array(triangles.length);
   const alike = (p, q) => {
     const s = 3 * Math.floor(p / 3), t = 3 * Math.floor(q / 3);
+    if (cut && cut[s / 3] !== cut[t / 3]) return false;
     return normals[s] * normals[t] + normals[s + 1] * normals[t + 1] + normals[s + 2] * normals[t + 2] > CREASE;
   };
   for (let node = 0; node < around.length; node++) {

@@ -15,7 +15,7 @@ export class Pointer {
     this.caster = new Raycaster();
     this.active = null;
     const { container } = stage;
-    this.canvas = container.querySelector("#stroke");
+    this.lines = container.querySelectorAll("#stroke polyline");
     const listen = (name, action) => container.addEventListener(name, action, { capture: true });
     listen("pointerdown", (event) => this.down(event));
     listen("pointermove", (event) => this.moved(event));
@@ -168,9 +168,6 @@ export class Pointer {
   startCut(event) {
     if (!this.app.can("cut")) return null;
     const { stage, app } = this;
-    const pen = this.canvas.getContext("2d");
-    this.canvas.width = stage.container.clientWidth;
-    this.canvas.height = stage.container.clientHeight;
     const points = [];
     const edges = [];
     let depth = null;
@@ -186,18 +183,8 @@ export class Pointer {
       edges.push({ origin: ray.origin.clone(), direction: ray.direction.clone(), distance, scale });
       draw();
     };
-    const draw = () => {
-      pen.clearRect(0, 0, this.canvas.width, this.canvas.height);
-      pen.lineCap = pen.lineJoin = "round";
-      for (const [width, style] of [[5, "#ffffffcc"], [2, "#c0392b"]]) {
-        pen.lineWidth = width;
-        pen.strokeStyle = style;
-        pen.beginPath();
-        points.forEach(([x, y], i) => (i ? pen.lineTo(x, y) : pen.moveTo(x, y)));
-        pen.stroke();
-      }
-    };
-    const clear = () => pen.clearRect(0, 0, this.canvas.width, this.canvas.height);
+    const draw = () => this.lines.forEach((line) => line.setAttribute("points", points.join(" ")));
+    const clear = () => this.lines.forEach((line) => line.removeAttribute("points"));
     add(event);
     return {
       move: (pointer) => (pointer.getCoalescedEvents?.().length ? pointer.getCoalescedEvents() : [pointer]).forEach(add),

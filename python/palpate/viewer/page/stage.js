@@ -76,7 +76,7 @@ export class Stage {
     let start = 0;
     let firstTriangle = 0;
     this.bodies = header.bodies.map((look, i) => {
-      const body = new BodyMesh(look, this.plain, arrays[`rest/${i}`], arrays[`triangles/${i}`], start, firstTriangle);
+      const body = new BodyMesh(look, this.plain, arrays[`rest/${i}`], arrays[`triangles/${i}`], arrays[`cut/${i}`], start, firstTriangle);
       start += body.nodeCount;
       firstTriangle += body.triangles.length / 3;
       const before = styles.get(look.name);
