@@ -9,7 +9,7 @@ SOURCES := pyproject.toml Cargo.toml Cargo.lock $(shell find crates -name '*.rs'
 CRATES := --workspace --exclude palpate-python
 
 .DEFAULT_GOAL := help
-.PHONY: help install run view test test-rust test-python soak soak-mechanics fuzz lint format bench docs wheel models three clean
+.PHONY: help install run view test test-rust test-python soak soak-mechanics fuzz lint deny format bench docs wheel crates models three clean
 
 help: ## Show this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /\1\t/' | expand -t 14
@@ -67,6 +67,9 @@ lint: install ## Check format, clippy, rustdoc, ruff and types
 	$(BIN)/mypy
 	$(BIN)/python -m mypy.stubtest palpate._core
 
+deny: ## Check licences and advisories of what is linked (needs cargo-deny and the network)
+	cargo deny --locked check
+
 format: install ## Format Rust and Python
 	cargo fmt --all
 	$(BIN)/ruff format python tests examples docs
@@ -83,6 +86,9 @@ $(VENV)/.docs: $(VENV)/.installed
 wheel: $(BIN)/maturin ## Build a wheel for any Python from 3.10 on, and try it in an empty environment
 	$(BIN)/maturin build --release --locked --strip --out dist
 	$(PYTHON) tests/try_wheel.py dist
+
+crates: ## Pack the Rust crates as they would be published, and build them from that
+	cargo package --locked --workspace --exclude palpate-python --exclude palpate-fuzz
 
 models: install ## Make the example organs again
 	$(BIN)/python python/palpate/models/make_models.py
