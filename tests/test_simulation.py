@@ -182,6 +182,8 @@ def test_bad_values_change_nothing(make_box, values, error):
         ({"time_step": "fast"}, TypeError, "time_step"),
         ({"threads": 0}, ValueError, "threads"),
         ({"method": "none"}, ValueError, "method"),
+        ({"substeps": 4}, ValueError, "give a smaller time_step"),
+        ({"substeps": "many"}, ValueError, "substeps"),
     ],
 )
 def test_bad_options_are_refused_by_name(cube, options, error, text):
@@ -258,3 +260,49 @@ def test_bodies_without_stress_are_named(falling):
     simulation = palpate.Simulation(falling)
     with pytest.raises(ValueError, match="'plate' is rigid or of law linear"):
         simulation.stress("plate")
+
+
+def pressed(make_box, **options):
+    """A block whose top is moved through nearly all of its height at once."""
+    box = make_box((6, 6, 6), size=0.1)
+    height = box.nodes[:, 2]
+    body = palpate.Body(
+        box,
+        name="block",
+        material=palpate.Material(law="neo-hookean", young=5e3, damping=0.02),
+        fixed_nodes=np.flatnonzero(height == height.min()),
+    )
+    simulation = palpate.Simulation(palpate.Model([body], gravity=(0, 0, 0)), **options)
+    top = np.flatnonzero(height == height.max())
+    return simulation, simulation.drive(0, top, box.nodes[top] - [0, 0, 0.085])
+
+
+def test_a_step_that_fails_is_tried_again_in_smaller_ones(make_box, tmp_path):
+    simulation, drive = pressed(make_box, substeps="auto")
+    simulation.save(tmp_path / "state.palpate")
+    report = simulation.step()
+    assert report.substeps > 1
+    assert (report.step, report.time) == (1, 1 / 60)
+    assert np.array_equal(simulation.positions[0][drive.nodes], drive.targets)
+    assert simulation.step(20).substeps >= 1
+    assert simulation.step().substeps == 1
+    loaded = palpate.Simulation.load(tmp_path / "state.palpate", threads=2)
+    assert loaded.step().substeps == report.substeps
+
+
+def test_a_step_that_fails_names_where_and_why_and_changes_nothing(make_box):
+    for substeps, tried in ((1, "failed:"), ("auto", "also in 64 smaller ones:")):
+        simulation, drive = pressed(make_box, substeps=substeps)
+        simulation.step()
+        before = [simulation.positions[0].tobytes(), simulation.velocities[0].tobytes()]
+        drive.move_to(np.full((len(drive.nodes), 3), 1e300))
+        with pytest.raises(palpate.SimulationError, match=r"'block', node .* its drive") as caught:
+            simulation.step()
+        assert tried in str(caught.value)
+        assert "move it step by step" in str(caught.value)
+        error = caught.value
+        assert error.body == 0
+        assert error.node in drive.nodes
+        assert error.node in simulation.model.bodies[0].mesh.tetrahedra[error.tetrahedron]
+        assert [simulation.positions[0].tobytes(), simulation.velocities[0].tobytes()] == before
+        assert simulation.time == 1 / 60

@@ -58,7 +58,26 @@ class ModelError(PalpateError, ValueError):
 
 
 class SimulationError(PalpateError, RuntimeError):
-    """A simulation that cannot start or go on; the state is that before the failed step."""
+    """A simulation that cannot start or go on; the state is that before the failed step.
+
+    Attributes
+    ----------
+    body, node, tetrahedron : int or None
+        Where a step failed: index of the body, node that is to blame or else the first that is
+        lost, first tetrahedron of the node (None of a rigid body).
+    """
+
+    def __init__(
+        self,
+        message: str,
+        body: int | None = None,
+        node: int | None = None,
+        tetrahedron: int | None = None,
+    ) -> None:
+        super().__init__(message)
+        self.body = body
+        self.node = node
+        self.tetrahedron = tetrahedron
 
 
 class CheckpointError(PalpateError, ValueError):

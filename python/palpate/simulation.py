@@ -45,7 +45,7 @@ class StepReport:
     ``max_depth`` [m]; ``newton_iterations`` are the quasi-Newton iterations of the body that took
     most (none with the linear law), ``iterations`` the contact solver's changes of a force, both
     summed; ``residual`` is the largest error of a gap or slip that it left in the last step, in
-    contact distances.
+    contact distances. ``substeps`` is the largest number of smaller steps that one of them took.
     """
 
     step: int
@@ -60,6 +60,7 @@ class StepReport:
     newton_iterations: int
     iterations: int
     residual: float
+    substeps: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,6 +100,11 @@ class Simulation:
         Worker threads. Results are the same bits at any number.
     leaf_size, split, method
         Contact detection, as in `Scene`.
+    substeps : 1 or "auto"
+        ``"auto"``: a step that fails is tried again from the last good state in 2, 4, 8, ... and at
+        last 64 smaller ones, during which drives, tools and springs' targets move steadily.
+        `StepReport.substeps` says how many it took. Steps that turn tetrahedra over to more than
+        their volume at rest, or blow them up to ten times that, count as failed too.
 
     Examples
     --------
@@ -118,6 +124,7 @@ class Simulation:
         leaf_size: int | None = None,
         split: str = "middle",
         method: str = "wide",
+        substeps: int | str = 1,
     ) -> None:
         if isinstance(model, (str, os.PathLike)):
             model = read_model(model)
@@ -126,13 +133,21 @@ class Simulation:
         time_step = _arrays.scalar(time_step, "time_step")
         if time_step <= 0:
             raise ValueError(f"time_step: expected a positive number of seconds, got {time_step}")
+        if substeps not in (1, "auto"):
+            raise ValueError(
+                f'substeps: expected 1 or "auto", got {substeps!r}; for smaller steps throughout '
+                "give a smaller time_step"
+            )
         self._options: dict[str, Any] = {
             "threads": _arrays.count(threads, "threads"),
             "leaf_size": None if leaf_size is None else _arrays.count(leaf_size, "leaf_size"),
             "split": _choice(split, "split", SPLITS),
             "method": _choice(method, "method", METHODS),
+            "substeps": substeps,
         }
-        self._start(_core.Simulation(model._core, time_step, **self._options))
+        options = {name: value for name, value in self._options.items() if name != "substeps"}
+        auto = substeps == "auto"
+        self._start(_core.Simulation(model._core, time_step, **options, auto_substeps=auto))
 
     def _start(self, core: _core.Simulation) -> None:
         self._core = core
@@ -187,7 +202,8 @@ class Simulation:
         Raises
         ------
         SimulationError
-            If a step fails; the state is then that before the failed step.
+            If a step fails, with ``substeps="auto"`` also in smaller ones. The state is then that
+            before the failed step, bit for bit; the error names body, node, tetrahedron and cause.
         """
         count = _arrays.count(count, "count")
         # Those that were released stay known: a snapshot may bring them back.
@@ -486,8 +502,10 @@ class Simulation:
             If the file is damaged or not a checkpoint.
         """
         simulation = cls.__new__(cls)
-        simulation._options = {"threads": threads}
-        simulation._start(_core.Simulation.load(os.fspath(path), _arrays.count(threads, "threads")))
+        core = _core.Simulation.load(os.fspath(path), _arrays.count(threads, "threads"))
+        substeps = "auto" if core.auto_substeps else 1
+        simulation._options = {"threads": threads, "substeps": substeps}
+        simulation._start(core)
         return simulation
 
     def view(
@@ -550,6 +568,7 @@ def _together(reports: Sequence[StepReport]) -> StepReport:
         stages=summed([each.stages for each in reports]),
         newton_iterations=sum(each.newton_iterations for each in reports),
         iterations=sum(each.iterations for each in reports),
+        substeps=max(each.substeps for each in reports),
     )
 
 

@@ -133,8 +133,8 @@ impl MovingBody {
     }
 
     /// Moves the body as if contact forces stayed as they are; `surface` are its surface nodes, `end`
-    /// the time after the step [s].
-    pub(crate) fn predict(&mut self, surface: &[u32], end: f64, time_step: f64) {
+    /// the time after the step [s]. What is told where to go goes a `part` of its way.
+    pub(crate) fn predict(&mut self, surface: &[u32], end: f64, time_step: f64, part: f64) {
         self.expected_nodes.clear();
         match &mut self.kind {
             BodyKind::Elastic(elastic) => {
@@ -142,10 +142,17 @@ impl MovingBody {
                 let loaded = |&&node: &&u32| self.contact_forces[node as usize] != [0.0; 3];
                 self.expected_nodes.extend(surface.iter().filter(loaded));
                 let contact = self.touched.then_some(&*self.contact_forces);
-                elastic.predict(&self.positions, &self.velocities, &self.forces, contact);
+                elastic.predict(&self.positions, &self.velocities, &self.forces, contact, part);
                 elastic.end_positions(&self.positions, &mut self.expected_positions);
             }
-            BodyKind::Rigid(rigid) => rigid.place(end, &mut self.expected_positions),
+            BodyKind::Rigid(rigid) => {
+                rigid.place(end, &mut self.expected_positions);
+                if part < 1.0 && rigid.pose.is_some() {
+                    for (end, x) in self.expected_positions.iter_mut().zip(&self.positions) {
+                        *end = std::array::from_fn(|k| x[k] + part * (end[k] - x[k]));
+                    }
+                }
+            }
         }
         self.motion = self.expected_motion(surface, time_step);
     }
@@ -234,6 +241,13 @@ impl MovingBody {
         self.expected_nodes.extend(surface.iter().filter(loaded));
         elastic.end_positions(&self.positions, &mut self.expected_positions);
         true
+    }
+
+    /// Forgets what a step that failed has found out; contact forces are set by the caller.
+    pub(crate) fn undo(&mut self) {
+        if let BodyKind::Elastic(elastic) = &mut self.kind {
+            elastic.undo();
+        }
     }
 
     /// The first node whose next state is not finite.

@@ -2,7 +2,9 @@
 
 mod change;
 mod drive;
+mod failure;
 mod hands;
+mod substeps;
 
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -24,6 +26,7 @@ use crate::state::{BodyState, ContactForce, State};
 use crate::ties::Ties;
 pub use drive::Drive;
 use drive::Drives;
+pub use failure::{Cause, Failure};
 
 /// Motion margin of a search, in mean edges of the finer deformable surface: contacts farther
 /// ahead are found in a later step, or as penetrations.
@@ -127,6 +130,10 @@ pub struct Dynamics {
     start_step: u64,
     step: u64,
     predict_time: Duration,
+    /// How much of the way to where it is told to go everything goes in this step.
+    part: f64,
+    /// Whether a step that blows tetrahedra up fails.
+    strict: bool,
 }
 
 impl Dynamics {
@@ -212,6 +219,8 @@ impl Dynamics {
             start_step: 0,
             step: 0,
             predict_time: Duration::ZERO,
+            part: 1.0,
+            strict: false,
         })
     }
 
@@ -264,12 +273,17 @@ impl Dynamics {
 
     /// Moves every body as if it were alone, which tells how far to look for contacts.
     pub fn begin_step(&mut self) {
+        self.begin_part(1.0);
+    }
+
+    fn begin_part(&mut self, part: f64) {
         let start = Instant::now();
+        self.part = part;
         let end = self.time_at(self.step + 1);
         let time_step = self.options.time_step;
         let surfaces = std::mem::take(&mut self.surfaces);
         self.for_each_body(|index, body| {
-            body.predict(surfaces[index].mesh().surface_nodes(), end, time_step);
+            body.predict(surfaces[index].mesh().surface_nodes(), end, time_step, part);
         });
         self.surfaces = surfaces;
         self.predict_time = start.elapsed();
@@ -303,7 +317,8 @@ impl Dynamics {
     /// positions, `penetration` every surface node inside another body.
     ///
     /// # Errors
-    /// If the state would not be finite; the state is then that before [`Dynamics::begin_step`].
+    /// If the state would not be finite, or tetrahedra blown up in a strict step; the state is then that
+    /// before [`Dynamics::begin_step`], bit for bit.
     ///
     /// # Panics
     /// If a pair names a body or node that does not exist.
@@ -363,12 +378,9 @@ impl Dynamics {
         stats.contacts = response.contacts().len();
         stats.self_contacts =
             response.contacts().iter().filter(|c| c.bodies[0] == c.bodies[1]).count();
-        for index in 0..self.body_count() {
-            if let Some(node) = self.body(index).first_broken_node() {
-                let what = "the state after the step";
-                self.set_contact_forces(response.last().forces());
-                return Err(MechanicsError::NotFinite { body: index, node, what });
-            }
+        if let Some(failure) = self.find_failure() {
+            self.undo(response);
+            return Err(failure.into());
         }
         let iterations = (0..self.body_count()).map(|body| self.body(body).newton_iterations());
         stats.newton_iterations = iterations.max().unwrap_or(0) as usize;
@@ -378,10 +390,17 @@ impl Dynamics {
         let refactored = (0..self.body_count()).filter(|&body| self.body(body).refactored);
         stats.refactored = refactored.count();
         response.remember();
-        self.ties.finish(response.tie_forces());
+        self.ties.finish(response.tie_forces(), self.part);
         self.finish_drives();
         self.step += 1;
         Ok(stats)
+    }
+
+    /// Goes back to before the step that has begun.
+    fn undo(&mut self, response: &mut Response) {
+        response.undo();
+        self.set_contact_forces(response.last().forces());
+        self.for_each_body(|_, body| body.undo());
     }
 
     /// One iteration of the bodies that contact forces act on; true if the forces must be solved for
@@ -403,7 +422,7 @@ impl Dynamics {
             let position = self.body(body as usize).positions[node as usize];
             (position, parameters.distance(parameters))
         };
-        self.ties.add_candidates(place, candidates);
+        self.ties.add_candidates(place, self.part, candidates);
     }
 
     /// One solve for the contact forces of the candidates.

@@ -3,6 +3,8 @@
 use palpate_model::Body;
 use palpate_solver::FactorError;
 
+use crate::dynamics::Failure;
+
 /// Why a model, a state or a step was refused.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -100,7 +102,10 @@ pub enum MechanicsError {
         /// Index of the body.
         body: usize,
     },
-    /// NaN or infinity in what was given, or as the result of a step.
+    /// A step that failed.
+    #[error("body {}, {}", .0.body, .0)]
+    Step(Failure),
+    /// NaN or infinity in what was given.
     #[error("{what} of node {node} of body {body} is not finite")]
     NotFinite {
         /// Index of the body.
@@ -176,6 +181,12 @@ pub enum MechanicsError {
     /// A contact of a state that names a body or node that does not exist, or is not finite.
     #[error("contact {0} of the state does not fit the bodies; is it a state of this model?")]
     BadContact(usize),
+}
+
+impl From<Failure> for MechanicsError {
+    fn from(failure: Failure) -> Self {
+        Self::Step(failure)
+    }
 }
 
 /// A parameter of a body: name, value, whether it is valid, what would be.

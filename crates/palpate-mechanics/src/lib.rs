@@ -15,7 +15,7 @@ mod ties;
 mod tissue;
 
 pub use contact::Contact;
-pub use dynamics::{Drive, Dynamics, DynamicsOptions, StageTimes, StepStats};
+pub use dynamics::{Cause, Drive, Dynamics, DynamicsOptions, Failure, StageTimes, StepStats};
 pub use energy::{Energy, Momentum};
 pub use error::MechanicsError;
 pub use state::{BodyState, ContactForce, State};

@@ -130,15 +130,20 @@ impl Ties {
     }
 
     /// Adds all ties to the candidates of a step, the springs first; `place` gives the position of a node and the
-    /// contact distance of its body.
+    /// contact distance of its body. Springs' ends go a `part` of their way from where they were.
     pub(crate) fn add_candidates(
         &self,
         place: impl Fn(u32, u32) -> (Point, f64),
+        part: f64,
         candidates: &mut Vec<Candidate>,
     ) {
         candidates.extend(self.pulls.iter().map(|pull| {
             let (position, distance) = place(pull.body, pull.node);
-            let offset = DVec3::from_array(position) - DVec3::from_array(pull.target);
+            let mut offset = DVec3::from_array(position) - DVec3::from_array(pull.target);
+            if part < 1.0 {
+                let before = DVec3::from_array(pull.force) / -pull.stiffness;
+                offset = before + part * (offset - before);
+            }
             Candidate {
                 bodies: [pull.body; 2],
                 nodes: [pull.node; 4],
@@ -173,11 +178,12 @@ impl Ties {
         keys
     }
 
-    /// Keeps the forces of the step that ends: those of the springs come first [N].
-    pub(crate) fn finish(&mut self, forces: impl Iterator<Item = DVec3>) {
+    /// Keeps the forces of the step that ends, in which springs' ends went a `part` of their way: those of
+    /// the springs come first [N].
+    pub(crate) fn finish(&mut self, forces: impl Iterator<Item = DVec3>, part: f64) {
         for (pull, force) in self.pulls.iter_mut().zip(forces) {
             pull.force = force.to_array();
-            pull.moved = 0.0;
+            pull.moved *= 1.0 - part;
         }
     }
 }

@@ -82,7 +82,14 @@ impl ToPython for SceneError {
 
 impl ToPython for SimulationError {
     fn to_python(self, py: Python<'_>) -> PyErr {
-        exception(py, "SimulationError", (self.to_string(),))
+        let text = self.to_string();
+        match self {
+            Self::Step { failure, .. } => {
+                let place = (failure.body, failure.node, failure.tetrahedron);
+                exception(py, "SimulationError", (text, place.0, place.1, place.2))
+            }
+            _ => exception(py, "SimulationError", (text,)),
+        }
     }
 }
 

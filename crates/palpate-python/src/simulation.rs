@@ -8,7 +8,9 @@ use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2};
 use palpate::contact::{IntersectionOptions, PairKind};
 use palpate::geometry::Point;
 use palpate::mechanics::Pull;
-use palpate::{ChangeReport, Simulation, SimulationOptions, Snapshot, StepReport, StepTimes};
+use palpate::{
+    ChangeReport, Simulation, SimulationOptions, Snapshot, StepReport, StepTimes, Substeps,
+};
 use pyo3::prelude::*;
 use pyo3::types::{IntoPyDict, PyDict, PyTuple};
 
@@ -110,17 +112,18 @@ type ContactColumns<'py> = (
 impl PySimulation {
     #[new]
     fn new(
-        py: Python<'_>,
-        model: &PyModel,
+        model: PyRef<'_, PyModel>,
         time_step: f64,
         threads: usize,
         leaf_size: Option<usize>,
         split: &str,
         method: &str,
+        auto_substeps: bool,
     ) -> PyResult<Self> {
         let scene = scene_options(leaf_size, split, method, threads)?;
-        let options = SimulationOptions { time_step, scene, threads };
-        let model = model.model.clone();
+        let substeps = if auto_substeps { Substeps::Auto } else { Substeps::One };
+        let options = SimulationOptions { time_step, scene, threads, substeps };
+        let (py, model) = (model.py(), model.model.clone());
         let simulation = raise(py, py.detach(|| Simulation::new(model, options)))?;
         Ok(Self { simulation: Mutex::new(simulation) })
     }
@@ -138,6 +141,11 @@ impl PySimulation {
     #[getter]
     fn time_step(&self) -> f64 {
         self.lock().options().time_step
+    }
+
+    #[getter]
+    fn auto_substeps(&self) -> bool {
+        self.lock().options().substeps == Substeps::Auto
     }
 
     #[getter]
@@ -176,10 +184,10 @@ impl PySimulation {
 
     /// Steps `count` times; what `palpate.StepReport` holds.
     fn step<'py>(&self, py: Python<'py>, count: usize) -> PyResult<Bound<'py, PyDict>> {
-        let (report, times, stages, iterations, newton) = {
+        let (report, times, stages, iterations, newton, substeps) = {
             let mut summed = StepTimes::default();
             let mut stages = [0.0; 9];
-            let (mut iterations, mut newton) = (0, 0);
+            let (mut iterations, mut newton, mut substeps) = (0, 0, 0);
             let mut last: Option<StepReport> = None;
             for _ in 0..count {
                 // One step at a time, so that Ctrl-C is answered between them.
@@ -191,9 +199,11 @@ impl PySimulation {
                 }
                 iterations += report.mechanics.iterations;
                 newton += report.mechanics.newton_iterations;
+                substeps = substeps.max(report.substeps);
                 last = Some(report);
             }
-            (last.expect("count is at least one"), summed, stages, iterations, newton)
+            let last = last.expect("count is at least one");
+            (last, summed, stages, iterations, newton, substeps)
         };
         let seconds = PyDict::new(py);
         for (stage, time) in times.named() {
@@ -213,6 +223,7 @@ impl PySimulation {
         row.set_item("newton_iterations", newton)?;
         row.set_item("iterations", iterations)?;
         row.set_item("residual", report.mechanics.residual)?;
+        row.set_item("substeps", substeps)?;
         Ok(row)
     }
 

@@ -12,7 +12,7 @@ use palpate_model::files::write_whole;
 use palpate_model::{Document, Model};
 use serde::{Deserialize, Serialize};
 
-use crate::simulation::{Simulation, SimulationError, SimulationOptions, Snapshot};
+use crate::simulation::{Simulation, SimulationError, SimulationOptions, Snapshot, Substeps};
 
 const MAGIC: [u8; 8] = *b"palpate\n";
 const VERSION: u32 = 5;
@@ -55,6 +55,7 @@ struct Payload<M, S> {
     text: Option<String>,
     time_step: f64,
     scene: SceneOptions,
+    substeps: Substeps,
     /// Before all cuts; `None` where there were none.
     initial_model: Option<(M, Option<String>)>,
     initial: S,
@@ -74,6 +75,7 @@ impl Simulation {
             text: self.model().to_text(),
             time_step: self.options().time_step,
             scene: self.options().scene,
+            substeps: self.options().substeps,
             initial_model: was_cut.then(|| (initial.model.as_ref(), initial.model.to_text())),
             initial: &initial.state,
             state: &now.state,
@@ -108,8 +110,12 @@ impl Simulation {
             Some((initial, text)) => with_text(initial, text)?,
             None => Arc::clone(&model),
         };
-        let options =
-            SimulationOptions { time_step: payload.time_step, scene: payload.scene, threads };
+        let options = SimulationOptions {
+            time_step: payload.time_step,
+            scene: payload.scene,
+            threads,
+            substeps: payload.substeps,
+        };
         let continued = || {
             let mut simulation = Simulation::in_state(model, options, payload.state)?;
             simulation.set_initial(Snapshot { model: initial_model, state: payload.initial });

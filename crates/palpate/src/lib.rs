@@ -28,5 +28,5 @@ pub use palpate_cutting::{Blade, CutOptions};
 pub use palpate_model::{CoreLoader, Mesh, MeshData, Model, ModelError, load_model};
 pub use simulation::{
     BodyChange, ChangeReport, ChangeTimes, Simulation, SimulationError, SimulationOptions,
-    Snapshot, StepReport, StepTimes,
+    Snapshot, StepReport, StepTimes, Substeps,
 };

@@ -3,6 +3,7 @@
 mod change;
 mod drive;
 mod hands;
+mod substeps;
 
 use std::ops::AddAssign;
 use std::sync::Arc;
@@ -12,11 +13,13 @@ use palpate_contact::{PenetratingNode, ProximityOptions, Scene, SceneError, Scen
 use palpate_cutting::CutError;
 use palpate_geometry::Point;
 use palpate_mechanics::{
-    Contact, Dynamics, DynamicsOptions, Energy, MechanicsError, State, StepStats,
+    Contact, Dynamics, DynamicsOptions, Energy, Failure, MechanicsError, State, StepStats,
 };
 use palpate_model::{MeshError, Model};
 
 pub use change::{BodyChange, ChangeReport, ChangeTimes, Snapshot};
+use substeps::Finer;
+pub use substeps::Substeps;
 
 /// How a simulation runs.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,11 +30,18 @@ pub struct SimulationOptions {
     pub scene: SceneOptions,
     /// Worker threads for detection and mechanics; results are the same bits at any count.
     pub threads: usize,
+    /// What to do about a step that fails.
+    pub substeps: Substeps,
 }
 
 impl Default for SimulationOptions {
     fn default() -> Self {
-        Self { time_step: 1.0 / 60.0, scene: SceneOptions::default(), threads: 1 }
+        Self {
+            time_step: 1.0 / 60.0,
+            scene: SceneOptions::default(),
+            threads: 1,
+            substeps: Substeps::default(),
+        }
     }
 }
 
@@ -42,9 +52,24 @@ pub enum SimulationError {
     /// The bodies' surfaces or positions were refused by the detection.
     #[error(transparent)]
     Scene(#[from] SceneError),
-    /// A body cannot be simulated, or a step failed; the state is that before the step.
+    /// A body cannot be simulated, or what was given does not fit.
     #[error(transparent)]
     Mechanics(#[from] MechanicsError),
+    /// A step failed; the state is that before it.
+    #[error(
+        "the step from t = {time:.6} s failed{}: body {} '{name}', {failure}",
+        in_parts(*.substeps), failure.body
+    )]
+    Step {
+        /// Simulated time before it [s].
+        time: f64,
+        /// Into how many smaller ones it was divided at last; 1 if it was not.
+        substeps: u32,
+        /// Name of the body.
+        name: String,
+        /// Where and why.
+        failure: Failure,
+    },
     /// A body that could not be cut; nothing has changed.
     #[error("body {body} cannot be cut: {source}")]
     Cut {
@@ -78,6 +103,10 @@ pub enum SimulationError {
         /// Number of bodies.
         count: usize,
     },
+}
+
+fn in_parts(substeps: u32) -> String {
+    if substeps > 1 { format!(", also in {substeps} smaller ones") } else { String::new() }
 }
 
 /// Wall-clock time of each stage of a step.
@@ -133,6 +162,8 @@ pub struct StepReport {
     pub penetrating_nodes: usize,
     /// Deepest penetration [m], zero when there is none.
     pub max_depth: f64,
+    /// How many smaller steps it took: 1 unless the step failed and was tried again.
+    pub substeps: u32,
     /// The mechanics' own statistics.
     pub mechanics: StepStats,
 }
@@ -168,6 +199,8 @@ pub struct Simulation {
     initial: Snapshot,
     /// Copy of the last search: the scene's own list is gone when it searches for close pairs.
     penetration: Vec<PenetratingNode>,
+    /// For steps that are tried again, once there was one.
+    finer: Option<Box<Finer>>,
 }
 
 impl Simulation {
@@ -187,21 +220,34 @@ impl Simulation {
         let SimulationOptions { time_step, threads, .. } = options;
         let dynamics = Dynamics::new(&model, DynamicsOptions { time_step, threads })?;
         let initial = Snapshot { model: Arc::clone(&model), state: dynamics.state() };
-        Ok(Self { model, options, scene, dynamics, initial, penetration: Vec::new() })
+        let penetration = Vec::new();
+        Ok(Self { model, options, scene, dynamics, initial, penetration, finer: None })
     }
 
     /// Moves everything on by one time step.
     ///
     /// # Errors
-    /// If the step fails; the state is then that before the step.
+    /// If the step fails, with [`Substeps::Auto`] also in smaller ones; the state is then that before the
+    /// step, bit for bit.
     pub fn step(&mut self) -> Result<StepReport, SimulationError> {
+        self.dynamics.set_strict(self.options.substeps == Substeps::Auto);
+        match self.advance(1) {
+            Err(SimulationError::Mechanics(MechanicsError::Step(failure))) => {
+                self.try_again(failure)
+            }
+            other => other,
+        }
+    }
+
+    /// One step of the dynamics, `left` of which are left in which targets are reached.
+    fn advance(&mut self, left: u32) -> Result<StepReport, SimulationError> {
         let start = Instant::now();
         let mut times = StepTimes::default();
         self.scene()?;
         times.update = start.elapsed();
 
         let begin = Instant::now();
-        self.dynamics.begin_step();
+        self.dynamics.begin_substep(left);
         times.mechanics = begin.elapsed();
 
         let begin = Instant::now();
@@ -229,6 +275,7 @@ impl Simulation {
             proximity_pairs,
             penetrating_nodes: penetration.len(),
             max_depth: penetration.iter().fold(0.0, |deepest, node| node.depth.max(deepest)),
+            substeps: 1,
             mechanics,
         })
     }
@@ -363,7 +410,8 @@ impl Simulation {
     ) -> Result<Self, SimulationError> {
         let (scene, dynamics) = change::parts(&model, options, &state)?;
         let initial = Snapshot { model: Arc::clone(&model), state };
-        Ok(Self { model, options, scene, dynamics, initial, penetration: Vec::new() })
+        let penetration = Vec::new();
+        Ok(Self { model, options, scene, dynamics, initial, penetration, finer: None })
     }
 
     /// Cauchy stress [Pa] of each tetrahedron: xx, yy, zz, xy, yz, xz. `None` for rigid bodies and for the

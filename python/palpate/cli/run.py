@@ -40,6 +40,7 @@ class RunOptions:
     checkpoint: bool
     pictures: bool
     cut: str | None = None
+    substeps: str = "1"
 
 
 class Run:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
+from enum import Enum
 from pathlib import Path
 from typing import Annotated
 
@@ -26,6 +27,13 @@ from palpate.cli.summary import print_profile, print_summary
 from palpate.cutting import read_blades
 from palpate.model import Model
 from palpate.simulation import Simulation
+
+
+class Substeps(Enum):
+    """What to do about a step that fails."""
+
+    ONE = "1"
+    AUTO = "auto"
 
 
 def simulate(
@@ -61,6 +69,10 @@ def simulate(
         Path | None,
         typer.Option(help="Cut as this file of blade strokes says.", show_default=False),
     ] = None,
+    substeps: Annotated[
+        Substeps,
+        typer.Option(help="auto: try a step that fails again as 2, 4, ... up to 64 smaller ones."),
+    ] = Substeps.ONE,
     checkpoint: Annotated[
         bool, typer.Option("--checkpoint", help="Save OUTPUT/checkpoint.palpate at the end.")
     ] = False,
@@ -88,12 +100,15 @@ def simulate(
     """
     if model is None and resume is None:
         raise typer.BadParameter("give a MODEL, or a checkpoint with --resume")
-    if resume is not None and (time_step, leaf_size, method) != (None, None, None):
+    own = (time_step, leaf_size, method, None if substeps is Substeps.ONE else substeps)
+    if resume is not None and any(each is not None for each in own):
         raise typer.BadParameter(
-            "a checkpoint has its own: leave out --time-step, --leaf-size and --method"
+            "a checkpoint has its own: leave out --time-step, --leaf-size, --method and --substeps"
         )
     strokes = [] if cut is None else read_blades(cut)
-    simulation, notes = _start(model, resume, time_step or 1 / 60, threads, leaf_size, method)
+    simulation, notes = _start(
+        model, resume, time_step or 1 / 60, threads, leaf_size, method, substeps
+    )
     steps = max(1, math.ceil(duration / simulation.time_step - 1e-9))
     options = RunOptions(
         model=model if resume is None else str(resume),
@@ -105,6 +120,7 @@ def simulate(
         checkpoint=checkpoint,
         pictures=not no_pictures and pictures.available(),
         cut=None if cut is None else str(cut),
+        substeps=substeps.value,
     )
     run = Run(simulation, output, options, quiet=json_output, strokes=strokes)
     if not no_pictures and not options.pictures:
@@ -134,6 +150,7 @@ def _start(
     threads: int,
     leaf_size: int | None,
     method: Method | None,
+    substeps: Substeps,
 ) -> tuple[Simulation, tuple[str, ...]]:
     opened: Model | None = None
     notes: tuple[str, ...] = ()
@@ -147,6 +164,7 @@ def _start(
             threads=threads,
             leaf_size=leaf_size,
             method=Method.WIDE.value if method is None else method.value,
+            substeps="auto" if substeps is Substeps.AUTO else 1,
         )
         return simulation, notes
     simulation = Simulation.load(resume, threads=threads)

@@ -25,6 +25,7 @@ _SERIES = (
     "newton_iterations",
     "iterations",
     "residual",
+    "substeps",
 )
 
 

@@ -31,6 +31,8 @@ pub(crate) struct Response {
     problem: Problem,
     solver: GaussSeidel,
     contacts: Vec<Contact>,
+    /// Those of the last step, while another one is under way.
+    contacts_before: Vec<Contact>,
     /// Forces on all that the step has: contacts, and the ties, which come first among the candidates.
     forces: Vec<ContactForce>,
     ties: usize,
@@ -83,6 +85,7 @@ impl Response {
         });
         self.guess.clone_from(&self.last);
         self.problem.collect(&self.candidates, body_count, &body);
+        std::mem::swap(&mut self.contacts, &mut self.contacts_before);
         self.contacts.clear();
     }
 
@@ -209,6 +212,17 @@ impl Response {
     /// Keeps the forces of the step that ends for the next one.
     pub(crate) fn remember(&mut self) {
         self.last.restore(&self.forces);
+    }
+
+    /// Goes back to the contacts of the last step: this one has failed.
+    pub(crate) fn undo(&mut self) {
+        std::mem::swap(&mut self.contacts, &mut self.contacts_before);
+    }
+
+    /// Takes the contacts of another simulation of the same bodies for those of the last step.
+    pub(crate) fn take_contacts(&mut self, contacts: &[Contact]) {
+        self.contacts.clear();
+        self.contacts.extend_from_slice(contacts);
     }
 
     /// Forces of the last step.

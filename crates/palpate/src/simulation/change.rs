@@ -181,7 +181,7 @@ pub(crate) fn parts(
     state: &State,
 ) -> Result<(Scene, Dynamics), SimulationError> {
     let meshes = model.bodies.iter().map(|body| Arc::clone(&body.mesh)).collect();
-    let SimulationOptions { time_step, threads, scene } = options;
+    let SimulationOptions { time_step, threads, scene, .. } = options;
     let scene = Scene::new(meshes, Some(&model.structure), SceneOptions { threads, ..scene })?;
     let dynamics = Dynamics::with_state(model, DynamicsOptions { time_step, threads }, state)?;
     Ok((scene, dynamics))

@@ -9,8 +9,9 @@ use super::{ElasticBody, Elasticity};
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Driven {
     node: u32,
-    /// Where it is at the end of the step [m].
+    /// Where it is to be [m], and where it is at the end of this step.
     target: DVec3,
+    next: DVec3,
     /// What moved it in the last step [N].
     force: DVec3,
 }
@@ -23,6 +24,7 @@ impl ElasticBody {
         self.driven.extend(targets.map(|(node, target)| Driven {
             node,
             target: DVec3::from_array(target),
+            next: DVec3::from_array(target),
             force: DVec3::ZERO,
         }));
         self.driven.sort_unstable_by_key(|driven| driven.node);
@@ -34,19 +36,20 @@ impl ElasticBody {
         Some(self.driven[place].force)
     }
 
-    /// Moves the driven nodes of the prediction to their targets.
-    pub(super) fn predict_driven(&mut self, x: &[Point]) {
-        for driven in &self.driven {
+    /// Moves the driven nodes of the prediction by a `part` of their way to their targets.
+    pub(super) fn predict_driven(&mut self, x: &[Point], part: f64) {
+        for driven in &mut self.driven {
             let node = driven.node as usize;
-            let moved = driven.target - DVec3::from_array(x[node]);
-            self.step.positions[node] = driven.target;
-            self.step.velocities[node] = moved / self.time_step;
+            let x = DVec3::from_array(x[node]);
+            driven.next = if part < 1.0 { x + part * (driven.target - x) } else { driven.target };
+            self.step.positions[node] = driven.next;
+            self.step.velocities[node] = (driven.next - x) / self.time_step;
         }
     }
 
     pub(super) fn place_driven(&self, positions: &mut [Point]) {
         for driven in &self.driven {
-            positions[driven.node as usize] = driven.target.to_array();
+            positions[driven.node as usize] = driven.next.to_array();
         }
     }
 

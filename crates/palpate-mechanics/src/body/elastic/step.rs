@@ -37,11 +37,21 @@ pub(super) struct Step {
     /// How contact forces turn the body: known once it has been touched in about this shape.
     pub(super) turning: Turning,
     pub(super) turning_known: bool,
+    before: TurningBefore,
     /// Whether contact forces act in this step.
     touched: bool,
     pub(super) workspace: SolveWorkspace,
     /// Where the nodes of half solutions are among the free ones.
     pub(super) places: Vec<u32>,
+}
+
+/// What was known of the turning before the step, should it fail.
+#[derive(Default)]
+struct TurningBefore {
+    was_known: bool,
+    /// Whether the step has made it anew; it is here then.
+    was_made: bool,
+    turning: Turning,
 }
 
 impl Step {
@@ -66,6 +76,7 @@ impl Step {
             turns: false,
             turning: Turning::default(),
             turning_known: false,
+            before: TurningBefore::default(),
             touched: false,
             workspace,
             places: Vec::new(),
@@ -85,15 +96,19 @@ impl Step {
 }
 
 impl ElasticBody {
-    /// Predicts the motion and corrects it by all forces, `contact` being those of the last step.
+    /// Predicts the motion and corrects it by all forces, `contact` being those of the last step; driven
+    /// nodes go a `part` of their way.
     pub(in crate::body) fn predict(
         &mut self,
         x: &[Point],
         v: &[Point],
         forces: &[Point],
         contact: Option<&[Point]>,
+        part: f64,
     ) {
         let dt = self.time_step;
+        self.step.before.was_known = self.step.turning_known;
+        self.step.before.was_made = false;
         self.step.start = Inertia::new(&self.masses, x, v);
         if self.is_unattached() {
             self.predict_rigidly(x, v);
@@ -104,7 +119,7 @@ impl ElasticBody {
                 *predicted = if free { x + dt * v } else { x };
                 self.step.velocities[node] = if free { v } else { DVec3::ZERO };
             }
-            self.predict_driven(x);
+            self.predict_driven(x, part);
         }
         (self.step.center, self.step.frame) = self.place_of(self.step.positions.iter().copied());
         self.find_rotations();
@@ -208,9 +223,22 @@ impl ElasticBody {
         if !self.is_unattached() || self.step.turning_known {
             return;
         }
+        if !self.step.before.was_made {
+            std::mem::swap(&mut self.step.turning, &mut self.step.before.turning);
+            self.step.before.was_made = true;
+        }
         let rotations = std::mem::take(&mut self.step.rotations);
         self.turn_by(rotations.arms().iter().copied());
         self.step.rotations = rotations;
+    }
+
+    /// Forgets what a step that failed has found out.
+    pub(in crate::body) fn undo(&mut self) {
+        let Step { turning, turning_known, before, .. } = &mut self.step;
+        if std::mem::take(&mut before.was_made) {
+            std::mem::swap(turning, &mut before.turning);
+        }
+        *turning_known = before.was_known;
     }
 
     /// Finds out how contact forces turn the body in the shape that `arms` give.
