@@ -9,6 +9,8 @@ use super::Dynamics;
 
 /// What is told to go farther than so many times the size of its body in a step is to blame.
 const FAR: f64 = 3.0;
+/// A spring pulled over so many times the size of its body is beyond the numbers of the contact solver.
+const BEYOND: f64 = 1e12;
 /// A strict step must not leave a tetrahedron turned over to more than the first, or blown up to more than
 /// the second of these times its volume at rest, and to more than the third times what it was before.
 /// Squeezed flat, tissue turns elements over by less however small the steps, and recovers.
@@ -98,7 +100,7 @@ impl Dynamics {
             Some(self.failure(index, node))
         });
         let blown = || bodies.filter(|_| self.strict).find_map(|index| self.blown_up(index));
-        broken.or_else(blown)
+        broken.or_else(|| self.pulled_beyond()).or_else(blown)
     }
 
     fn failure(&self, index: usize, lost: usize) -> Failure {
@@ -131,11 +133,7 @@ impl Dynamics {
         if let Some((node, distance)) = largest(driven).filter(far) {
             return Some((node, Cause::Driven(distance)));
         }
-        let pulls = self.ties.pulls().iter().filter(|pull| pull.body as usize == index);
-        let pulls = pulls.map(|pull| {
-            (pull.node as usize, distance(&body.positions[pull.node as usize], &pull.target))
-        });
-        if let Some((node, distance)) = largest(pulls).filter(far) {
+        if let Some((node, distance)) = self.farthest_pull(index).filter(far) {
             return Some((node, Cause::Pulled(distance)));
         }
         // A force that moves the whole body so far, let alone the node.
@@ -169,6 +167,24 @@ impl Dynamics {
     fn size(&self, index: usize) -> f64 {
         let bounds = self.surfaces[index].mesh().bounds();
         distance(&bounds.min, &bounds.max)
+    }
+
+    /// The node of a body that a spring pulls over the longest distance, and that [m].
+    fn farthest_pull(&self, index: usize) -> Option<(usize, f64)> {
+        let x = &self.body(index).positions;
+        let pulls = self.ties.pulls().iter().filter(|pull| pull.body as usize == index);
+        largest(
+            pulls.map(|pull| (pull.node as usize, distance(&x[pull.node as usize], &pull.target))),
+        )
+    }
+
+    fn pulled_beyond(&self) -> Option<Failure> {
+        (0..self.body_count()).find_map(|body| {
+            let (node, distance) = self.farthest_pull(body)?;
+            let (tetrahedron, cause) = (self.tetrahedron_of(body, node), Cause::Pulled(distance));
+            let beyond = distance > BEYOND * self.size(body);
+            beyond.then_some(Failure { body, node, tetrahedron, cause })
+        })
     }
 
     /// The first tetrahedron of a body that a strict step must not leave like that.
