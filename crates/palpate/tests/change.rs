@@ -41,10 +41,6 @@ fn model(law: Law) -> Model {
         body.regions[0].1.density = 1100.0;
         body.processor = Some(3);
     }
-    // Without friction the upper box slides off once the cut opens.
-    for body in [&mut lower, &mut upper, &mut plate] {
-        body.contact.friction = 0.5;
-    }
     Model::from_bodies(vec![lower, upper, plate])
 }
 

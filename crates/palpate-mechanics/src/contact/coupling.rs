@@ -197,13 +197,18 @@ impl Coupling {
         }
     }
 
-    /// Adds to the displacements what the forces on the slots do, where they are not negligible.
-    pub(super) fn add_loads(&self, loads: &[DVec3], moved: &mut [f32]) {
+    /// Adds to the displacements what the forces on the slots of `nodes` do, where they are not negligible.
+    /// The order of the nodes is that of the sums: slots have no order.
+    pub(super) fn add_loads(&self, nodes: &[u32], loads: &[DVec3], moved: &mut [f32]) {
         let (moved, turn) = moved.split_at_mut(3 * self.nodes.stride());
         let squares = self.expected.iter().chain(loads).map(|load| load.length_squared());
         let limit = NEGLIGIBLE * NEGLIGIBLE * squares.fold(0.0, f64::max);
         let mut turned = [DVec3::ZERO; 2];
-        for (slot, &load) in loads.iter().enumerate().filter(|(_, f)| f.length_squared() > limit) {
+        for slot in nodes.iter().map(|&node| self.nodes.slot(node)) {
+            let load = loads[slot];
+            if load.length_squared() <= limit {
+                continue;
+            }
             add_columns(&[(self.nodes.column(slot), load.as_vec3())], moved);
             for (sum, turn) in turned.iter_mut().zip(self.turns.get(slot).into_iter().flatten()) {
                 *sum += *turn * load;

@@ -259,7 +259,7 @@ impl Problem {
         }
         for part in parts() {
             let moved = &mut moved[part.first..][..part.coupling.moved_len()];
-            part.coupling.add_loads(&loads[part.slots()], moved);
+            part.coupling.add_loads(&part.nodes, &loads[part.slots()], moved);
         }
     }
 

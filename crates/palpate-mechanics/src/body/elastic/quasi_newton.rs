@@ -35,6 +35,11 @@ const SLOW: u32 = 6;
 /// The same when a node has moved by more than this part of the body's radius since, apart from the
 /// body's motion as a whole: slow processes need few iterations in each of very many steps.
 const DEFORMED: f64 = 0.1;
+/// A move went too far when the residual along it has turned round and is more than this part of what it was;
+/// it is shortened so many times at most, and not below this part of it at a time.
+const OVERSHOT: f64 = 0.5;
+const MAX_SHORTENED: usize = 6;
+const SHORTEST: f64 = 0.1;
 /// Farthest that a node moves in an iteration, in mean edges.
 const LONGEST_MOVE: f64 = 1.0;
 
@@ -248,28 +253,8 @@ impl ElasticBody {
         let most = if held { MAX_HELD_ITERATIONS } else { MAX_ITERATIONS };
         let mut known = 0;
         let mut last = f64::INFINITY;
+        self.find_residual(method, forces, contact);
         for iteration in 0..most {
-            std::mem::swap(&mut method.scratch, &mut method.residual);
-            self.find_residual(method, forces, contact);
-            if iteration > 0 {
-                // The move of the last iteration waits in the next pair.
-                let QuasiNewton { pairs, residual, scratch, .. } = &mut *method;
-                let pair = &mut pairs[known];
-                for ((y, r), before) in pair.y.iter_mut().zip(&*residual).zip(&*scratch) {
-                    *y = std::array::from_fn(|k| before[k] - r[k]);
-                }
-                let product = dot(&pair.s, &pair.y);
-                if product > 0.0 {
-                    pair.rho = product.recip();
-                    known += 1;
-                    if known == MEMORY {
-                        pairs.rotate_left(1);
-                        known -= 1;
-                    }
-                } else if held {
-                    break;
-                }
-            }
             let longest = self.next_move(method, known);
             if held && longest > SHRINKING * last {
                 break;
@@ -282,6 +267,50 @@ impl ElasticBody {
             if longest <= TOLERANCE * method.mean_edge {
                 break;
             }
+            std::mem::swap(&mut method.scratch, &mut method.residual);
+            self.find_residual(method, forces, contact);
+            self.shorten_move(method, known, forces, contact);
+            let QuasiNewton { pairs, residual, scratch, .. } = &mut *method;
+            let pair = &mut pairs[known];
+            for ((y, r), before) in pair.y.iter_mut().zip(&*residual).zip(&*scratch) {
+                *y = std::array::from_fn(|k| before[k] - r[k]);
+            }
+            let product = dot(&pair.s, &pair.y);
+            if product > 0.0 {
+                pair.rho = product.recip();
+                known += 1;
+                if known == MEMORY {
+                    pairs.rotate_left(1);
+                    known -= 1;
+                }
+            } else if held {
+                break;
+            }
+        }
+    }
+
+    /// Takes back what of the last move went too far, by the residuals before it, in the scratch memory,
+    /// and after it: those of a body that is stiffer by now than A says would grow without end.
+    fn shorten_move(
+        &mut self,
+        method: &mut QuasiNewton,
+        known: usize,
+        forces: &[Point],
+        contact: Option<&[Point]>,
+    ) {
+        for _ in 0..MAX_SHORTENED {
+            let s = &method.pairs[known].s;
+            let (before, after) = (dot(s, &method.scratch), dot(s, &method.residual));
+            if after >= -OVERSHOT * before {
+                return;
+            }
+            // Where the residual along the move vanishes if it changes in proportion.
+            let part = (before / (before - after)).max(SHORTEST);
+            for (d, s) in self.step.correction.iter_mut().zip(&mut method.pairs[known].s) {
+                *d = std::array::from_fn(|k| d[k] - (1.0 - part) * s[k]);
+                *s = s.map(|s| part * s);
+            }
+            self.find_residual(method, forces, contact);
         }
     }
 
