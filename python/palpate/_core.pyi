@@ -34,6 +34,9 @@ _Changes = tuple[list[tuple[int, _Change, dict[str, Any] | None, list[int]]], di
 _Stats = tuple[float, float, float, int, int, int, int, int, int]
 
 __all__ = [
+    "LAWS",
+    "MESH_EXTENSIONS",
+    "METHODS",
     "Blade",
     "Body",
     "Mesh",
@@ -51,6 +54,9 @@ __all__ = [
 ]
 
 __version__: str
+LAWS: tuple[str, ...]
+MESH_EXTENSIONS: tuple[str, ...]
+METHODS: tuple[str, ...]
 
 @final
 class Blade:

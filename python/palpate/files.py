@@ -16,7 +16,7 @@ from palpate.errors import MeshError
 from palpate.mesh import Mesh
 
 #: Extensions that the core reads and writes itself.
-CORE_FORMATS = (".seg", ".vtk")
+CORE_FORMATS = tuple(f".{each}" for each in _core.MESH_EXTENSIONS)
 
 #: meshio's name for cells whose first nodes are the corners of a tetrahedron or triangle.
 _TETRAHEDRA = {"tetra": False, "tetra10": True}

@@ -24,7 +24,7 @@ from palpate.mesh import Mesh, as_mesh
 from palpate.model import Body, Model, body_index, read_model, unique_name
 
 #: Ways to find the touching triangles; all give the same pairs.
-METHODS = ("wide", "paper", "all-pairs", "hash")
+METHODS = _core.METHODS
 
 #: Where a tree node is split along the longest axis of its box.
 SPLITS = ("middle", "count")

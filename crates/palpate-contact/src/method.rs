@@ -1,5 +1,4 @@
-//! The methods of finding what touches. A new one is a file below and its line in
-//! [`Method::detector`].
+//! The methods of finding what touches. A new one is a file below and its line in the list.
 
 mod all_pairs;
 mod hash;
@@ -17,35 +16,44 @@ use crate::scene::{
 };
 use crate::wide::WideSurface;
 
-/// How touching surface elements are found. All give the same pairs.
-#[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, Hash, serde::Deserialize, serde::Serialize,
-)]
-#[non_exhaustive]
-pub enum Method {
-    /// The paper's bounding trees: bodies, then leaves against subtrees, then polygons.
-    Paper,
-    /// Every pair of surface elements: slow and obvious.
-    AllPairs,
-    /// Spatial hashing after Teschner et al. 2003; proximity goes through the bounding trees.
-    Hash,
-    /// The wide layout: triangles in blocks of eight, level by level.
-    #[default]
-    Wide,
+/// The methods from lines of a name here, a name in words, and what works by it.
+macro_rules! methods {
+    ($($(#[$about:meta])* $name:ident = $word:literal => $detector:expr,)*) => {
+        /// How touching surface elements are found. All give the same pairs.
+        #[derive(
+            Clone, Copy, Debug, Default, PartialEq, Eq, Hash, serde::Deserialize, serde::Serialize,
+        )]
+        #[non_exhaustive]
+        pub enum Method {
+            $($(#[$about])* $name,)*
+        }
+
+        impl Method {
+            /// All methods.
+            pub const ALL: [Self; [$($word),*].len()] = [$(Self::$name),*];
+            /// Their names, in the same order.
+            pub const NAMES: [&'static str; Self::ALL.len()] = [$($word),*];
+
+            pub(crate) fn detector(self) -> Box<dyn Detector> {
+                match self {
+                    $(Self::$name => Box::new($detector),)*
+                }
+            }
+        }
+    };
 }
 
-impl Method {
-    /// All methods.
-    pub const ALL: [Self; 4] = [Self::Paper, Self::AllPairs, Self::Hash, Self::Wide];
-
-    pub(crate) fn detector(self) -> Box<dyn Detector> {
-        match self {
-            Self::Paper => Box::new(paper::Paper::default()),
-            Self::AllPairs => Box::new(all_pairs::AllPairs),
-            Self::Hash => Box::new(hash::Hash::default()),
-            Self::Wide => Box::new(wide::Wide::default()),
-        }
-    }
+// Checkpoints keep the place in this list: a new one comes last.
+methods! {
+    /// The paper's bounding trees: bodies, then leaves against subtrees, then polygons.
+    Paper = "paper" => paper::Paper::default(),
+    /// Every pair of surface elements: slow and obvious.
+    AllPairs = "all-pairs" => all_pairs::AllPairs,
+    /// Spatial hashing after Teschner et al. 2003; proximity goes through the bounding trees.
+    Hash = "hash" => hash::Hash::default(),
+    /// The wide layout: triangles in blocks of eight, level by level.
+    #[default]
+    Wide = "wide" => wide::Wide::default(),
 }
 
 /// Which elements of two bodies are a pair; `None` leaves the bodies out.

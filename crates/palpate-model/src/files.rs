@@ -1,4 +1,4 @@
-//! Object data on disk: `.seg` and legacy `.vtk`, by extension.
+//! Object data on disk, by extension. A format is a file below and its line in [`FORMATS`].
 
 mod model;
 mod seg;
@@ -55,9 +55,9 @@ pub enum FileErrorCause {
     Mesh(#[from] MeshError),
     /// The extension belongs to no format that is known here.
     #[error(
-        "{} is no mesh format known here; this reads and writes .seg and legacy .vtk, the Python \
-         package converts others",
-        if .0.is_empty() { "a name without extension".to_owned() } else { format!(".{}", .0) }
+        "{} is no mesh format known here; this reads and writes .{}, the Python package converts others",
+        if .0.is_empty() { "a name without extension".to_owned() } else { format!(".{}", .0) },
+        MESH_EXTENSIONS.join(" and .")
     )]
     UnknownFormat(String),
 }
@@ -117,32 +117,38 @@ struct ParseFailure {
     error: ReadError,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Format {
-    Seg,
-    Vtk,
+/// A format of mesh files.
+struct Format {
+    /// The end of the files' names, in lower case.
+    extension: &'static str,
+    /// Reads the arrays of a stream of so many bytes; nothing but their lengths is checked. The place is
+    /// the node or element whose line the caller wants to know.
+    read: fn(&mut dyn Read, u64, Option<Place>) -> Result<Parsed, ParseFailure>,
+    /// Writes a whole file or none.
+    write: fn(&Path, &Mesh) -> Result<(), FileError>,
 }
 
-impl Format {
-    fn of(path: &Path) -> Result<Self, FileErrorCause> {
-        let extension = path.extension().and_then(OsStr::to_str).unwrap_or_default();
-        match extension.to_ascii_lowercase().as_str() {
-            "seg" => Ok(Self::Seg),
-            "vtk" => Ok(Self::Vtk),
-            _ => Err(FileErrorCause::UnknownFormat(extension.to_owned())),
-        }
-    }
+/// The formats that are known.
+const FORMATS: [Format; 2] = [seg::FORMAT, vtk::FORMAT];
 
-    fn parse(
-        self,
-        reader: impl Read,
-        size: u64,
-        sought: Option<Place>,
-    ) -> Result<Parsed, ParseFailure> {
-        match self {
-            Self::Seg => seg::read(reader, size, sought),
-            Self::Vtk => vtk::read(reader, size, sought),
-        }
+/// The extensions of the formats that are read and written here.
+pub const MESH_EXTENSIONS: [&str; FORMATS.len()] = {
+    let mut extensions = [""; FORMATS.len()];
+    let mut index = 0;
+    while index < FORMATS.len() {
+        extensions[index] = FORMATS[index].extension;
+        index += 1;
+    }
+    extensions
+};
+
+impl Format {
+    fn of(path: &Path) -> Result<&'static Self, FileErrorCause> {
+        let extension = path.extension().and_then(OsStr::to_str).unwrap_or_default();
+        let mut known = const { &FORMATS }.iter();
+        known
+            .find(|format| extension.eq_ignore_ascii_case(format.extension))
+            .ok_or_else(|| FileErrorCause::UnknownFormat(extension.to_owned()))
     }
 }
 
@@ -159,9 +165,9 @@ pub fn read_mesh(path: &Path, options: &ReadOptions) -> Result<ReadMesh, FileErr
             let size = file.metadata()?.len();
             Ok((file, size))
         };
-        let (file, size) =
+        let (mut file, size) =
             open().map_err(|error| ParseFailure { line: None, error: error.into() })?;
-        format.parse(file, size, sought)
+        (format.read)(&mut file, size, sought)
     };
     let parsed = parse(None).map_err(|failure| match failure.error {
         ReadError::Io(error) => fail(None, error.into()),
@@ -194,14 +200,9 @@ fn build(parsed: Parsed, options: ReadOptions) -> Result<ReadMesh, MeshError> {
 /// # Errors
 /// If the extension is unknown, the file cannot be written, or a node set's name cannot be.
 pub fn write_mesh(path: &Path, mesh: &Mesh) -> Result<(), FileError> {
-    let fail = |cause| FileError { path: path.to_owned(), line: None, cause };
-    match Format::of(path).map_err(fail)? {
-        Format::Seg => {
-            seg::check_names(mesh).map_err(|message| fail(FileErrorCause::Syntax(message)))?;
-            write_atomically(path, |out| seg::write(out, mesh))
-        }
-        Format::Vtk => write_vtk(path, mesh, VtkEncoding::Binary),
-    }
+    let format =
+        Format::of(path).map_err(|cause| FileError { path: path.to_owned(), line: None, cause })?;
+    (format.write)(path, mesh)
 }
 
 /// Writes beside `path` and renames, so that a file under that name is always complete.

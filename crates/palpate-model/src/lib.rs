@@ -11,7 +11,8 @@ pub use body::{
     Material, Model, Pose, PoseParts, RigidKey, RigidMotion, Structure, triangle_axes,
 };
 pub use files::{
-    FileError, FileErrorCause, ReadMesh, ReadOptions, read_mesh, write_mesh, write_model,
+    FileError, FileErrorCause, MESH_EXTENSIONS, ReadMesh, ReadOptions, read_mesh, write_mesh,
+    write_model,
 };
 pub use language::{
     CoreLoader, Diagnostic, Document, LoadError, MeshLoader, ModelError, load_model,

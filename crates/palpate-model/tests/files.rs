@@ -88,7 +88,7 @@ fn a_failed_write_leaves_the_old_file() {
     assert_eq!(fs::read(&path).unwrap(), before);
     assert!(write_mesh(&folder.path().join("no/mesh.seg"), &full_mesh()).is_err());
     let error = write_mesh(Path::new("mesh.stl"), &full_mesh()).unwrap_err();
-    assert_snapshot!(error, @"mesh.stl: .stl is no mesh format known here; this reads and writes .seg and legacy .vtk, the Python package converts others");
+    assert_snapshot!(error, @"mesh.stl: .stl is no mesh format known here; this reads and writes .seg and .vtk, the Python package converts others");
 }
 
 const CORNER: &str = "seg 1\nnodes 4\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n";
@@ -148,7 +148,7 @@ fn a_missing_file_and_an_unknown_format_are_told() {
     assert!(error.to_string().starts_with("nowhere/kidney.seg: No such file"), "{error}");
     assert_eq!(error.line(), None);
     let error = read_mesh(Path::new("kidney.msh"), &ReadOptions::default()).unwrap_err();
-    assert_snapshot!(error, @"kidney.msh: .msh is no mesh format known here; this reads and writes .seg and legacy .vtk, the Python package converts others");
+    assert_snapshot!(error, @"kidney.msh: .msh is no mesh format known here; this reads and writes .seg and .vtk, the Python package converts others");
 }
 
 #[test]

@@ -243,7 +243,7 @@ fn core_loader_errors_are_shown_at_the_file_name() {
     3 |  TREE{ NE bad.seg }
       |           ^^^^^^^
 
-    error: kidney.stl: .stl is no mesh format known here; this reads and writes .seg and legacy .vtk, the Python package converts others
+    error: kidney.stl: .stl is no mesh format known here; this reads and writes .seg and .vtk, the Python package converts others
      --> case.bml:4:11
       |
     4 |  TREE{ NE kidney.stl }

@@ -16,7 +16,10 @@ mod simulation;
 /// The compiled core of palpate.
 #[pyo3::pymodule]
 mod _core {
+    use palpate::contact::Method;
+    use palpate::model::{Law, MESH_EXTENSIONS};
     use pyo3::prelude::*;
+    use pyo3::types::PyTuple;
 
     #[pymodule_export]
     use crate::cutting::{PyBlade, read_blades};
@@ -31,6 +34,9 @@ mod _core {
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
-        module.add("__version__", env!("CARGO_PKG_VERSION"))
+        module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+        module.add("MESH_EXTENSIONS", PyTuple::new(module.py(), MESH_EXTENSIONS)?)?;
+        module.add("METHODS", PyTuple::new(module.py(), Method::NAMES)?)?;
+        module.add("LAWS", PyTuple::new(module.py(), Law::NAMES)?)
     }
 }

@@ -312,12 +312,9 @@ pub(crate) fn scene_options(
         "count" => Split::Count,
         other => return Err(PyValueError::new_err(format!("split: unknown {other:?}"))),
     };
-    let method = match method {
-        "paper" => Method::Paper,
-        "all-pairs" => Method::AllPairs,
-        "hash" => Method::Hash,
-        "wide" => Method::Wide,
-        other => return Err(PyValueError::new_err(format!("method: unknown {other:?}"))),
-    };
+    let known = Method::NAMES.iter().position(|name| *name == method);
+    let method = known
+        .map(|index| Method::ALL[index])
+        .ok_or_else(|| PyValueError::new_err(format!("method: unknown {method:?}")))?;
     Ok(SceneOptions { leaf_size: leaf_size.unwrap_or(defaults.leaf_size), split, method, threads })
 }

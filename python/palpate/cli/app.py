@@ -3,23 +3,28 @@
 from __future__ import annotations
 
 import sys
+from importlib import import_module
 from typing import Annotated
 
 import typer
 
 from palpate._core import __version__
 from palpate.cli.bench import bench_app
-from palpate.cli.check import check
-from palpate.cli.convert import convert
-from palpate.cli.detect import detect
-from palpate.cli.format import format_file
-from palpate.cli.mesh import mesh
 from palpate.cli.output import reporting
-from palpate.cli.render import render
-from palpate.cli.simulate import simulate
-from palpate.cli.tree import tree
-from palpate.cli.tune import tune
-from palpate.cli.view import view
+
+#: In the order of --help. Each is the function `command` of a file of that name beside this one.
+COMMANDS = (
+    "check",
+    "tree",
+    "detect",
+    "simulate",
+    "view",
+    "render",
+    "tune",
+    "mesh",
+    "convert",
+    "format",
+)
 
 app = typer.Typer(
     name="palpate",
@@ -51,19 +56,8 @@ def _options(
     pass
 
 
-for _name, _command in (
-    ("check", check),
-    ("tree", tree),
-    ("detect", detect),
-    ("simulate", simulate),
-    ("view", view),
-    ("render", render),
-    ("tune", tune),
-    ("mesh", mesh),
-    ("convert", convert),
-    ("format", format_file),
-):
-    app.command(_name)(reporting(_command))
+for _name in COMMANDS:
+    app.command(_name)(reporting(import_module(f"palpate.cli.{_name}").command))
 app.add_typer(bench_app)
 
 

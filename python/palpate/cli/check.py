@@ -24,7 +24,7 @@ from palpate.results.measures import mean_ratios
 from palpate.scene import Scene
 
 
-def check(
+def command(
     model: ModelArgument, repair: RepairOption = False, json_output: JsonOption = False
 ) -> None:
     """Report every body of a model, its placement, its defects, and what overlaps at the start.

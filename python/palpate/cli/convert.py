@@ -14,7 +14,7 @@ from palpate.cli.output import JsonOption, RepairOption, console, print_json, vo
 from palpate.files import read_mesh, write_mesh
 
 
-def convert(
+def command(
     source: Annotated[
         Path, typer.Argument(metavar="IN", help="Mesh file; the extension names the format.")
     ],

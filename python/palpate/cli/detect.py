@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from enum import Enum
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -25,24 +24,28 @@ from palpate.cli.output import (
 )
 from palpate.contacts import Intersections
 from palpate.results.atomic import replacing
-from palpate.scene import Scene
+from palpate.scene import METHODS, Scene
 
 
-class Method(Enum):
-    """How touching triangles are found."""
-
-    WIDE = "wide"
-    PAPER = "paper"
-    ALL_PAIRS = "all-pairs"
-    HASH = "hash"
+def parse_method(text: str) -> str:
+    """The name of a detection method."""
+    if text not in METHODS:
+        raise typer.BadParameter(f"expected one of {', '.join(METHODS)}; got {text!r}")
+    return text
 
 
-MethodOption = Annotated[Method, typer.Option(help="How touching triangles are found.")]
+METHOD_NAMES = f"<{'|'.join(METHODS)}>"
+MethodOption = Annotated[
+    str,
+    typer.Option(
+        parser=parse_method, metavar=METHOD_NAMES, help="How touching triangles are found."
+    ),
+]
 
 
-def detect(
+def command(
     model: ModelArgument,
-    method: MethodOption = Method.WIDE,
+    method: MethodOption = "wide",
     leaf_size: LeafSizeOption = None,
     threads: ThreadsOption = 1,
     repeat: Annotated[int, typer.Option(min=1, help="Repeats that the times are of.")] = 20,
@@ -61,14 +64,14 @@ def detect(
     if output is not None and output.suffix not in (".csv", ".npy"):
         raise typer.BadParameter(f"expected a .csv or .npy file, got {output}")
     opened, path, _ = open_model(model)
-    scene = Scene(opened, leaf_size=leaf_size, method=method.value, threads=threads)
+    scene = Scene(opened, leaf_size=leaf_size, method=method, threads=threads)
     found, times = _measure(scene, repeat, not no_self)
     if output is not None:
         write_pairs(output, found)
     stats = found.stats
     report = {
         "model": str(path),
-        "method": method.value,
+        "method": method,
         "threads": threads,
         "repeats": repeat,
         "self_contact": not no_self,

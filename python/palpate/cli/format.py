@@ -19,7 +19,7 @@ from palpate.results.atomic import write_bytes
 _QUOTE_OR_COMMENT = re.compile(r'"(?:[^"]|"")*"|(//)')
 
 
-def format_file(
+def command(
     model: Annotated[str, typer.Argument(metavar="MODEL", help="A .bml file.", show_default=False)],
     check: Annotated[
         bool, typer.Option("--check", help="Only tell whether it is canonical: exit status 0 or 1.")

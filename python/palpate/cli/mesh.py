@@ -43,7 +43,7 @@ def parse_length(text: str) -> float:
     return value
 
 
-def mesh(
+def command(
     source: Annotated[
         Path,
         typer.Argument(metavar="IN", help="Closed surface, or segmented image (NIfTI, NRRD, MGH)."),

@@ -23,7 +23,7 @@ from palpate.results.drawing import (
 from palpate.simulation import Simulation
 
 
-def render(
+def command(
     target: Annotated[
         str,
         typer.Argument(

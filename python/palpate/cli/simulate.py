@@ -11,7 +11,7 @@ from typing import Annotated
 import typer
 
 from palpate import pictures
-from palpate.cli.detect import Method
+from palpate.cli.detect import METHOD_NAMES, parse_method
 from palpate.cli.opening import open_model
 from palpate.cli.output import (
     INTERRUPTED,
@@ -36,7 +36,7 @@ class Substeps(Enum):
     AUTO = "auto"
 
 
-def simulate(
+def command(
     model: Annotated[
         str | None,
         typer.Argument(
@@ -62,8 +62,12 @@ def simulate(
     threads: ThreadsOption = 1,
     leaf_size: LeafSizeOption = None,
     method: Annotated[
-        Method | None,
-        typer.Option(help="How touching triangles are found; wide unless given."),
+        str | None,
+        typer.Option(
+            parser=parse_method,
+            metavar=METHOD_NAMES,
+            help="How touching triangles are found; wide unless given.",
+        ),
     ] = None,
     cut: Annotated[
         Path | None,
@@ -116,7 +120,7 @@ def simulate(
         every=every,
         threads=threads,
         leaf_size=leaf_size,
-        method=None if method is None else method.value,
+        method=method,
         checkpoint=checkpoint,
         pictures=not no_pictures and pictures.available(),
         cut=None if cut is None else str(cut),
@@ -149,7 +153,7 @@ def _start(
     time_step: float,
     threads: int,
     leaf_size: int | None,
-    method: Method | None,
+    method: str | None,
     substeps: Substeps,
 ) -> tuple[Simulation, tuple[str, ...]]:
     opened: Model | None = None
@@ -163,7 +167,7 @@ def _start(
             time_step=time_step,
             threads=threads,
             leaf_size=leaf_size,
-            method=Method.WIDE.value if method is None else method.value,
+            method=method or "wide",
             substeps="auto" if substeps is Substeps.AUTO else 1,
         )
         return simulation, notes

@@ -30,7 +30,7 @@ class Split(Enum):
     COUNT = "count"
 
 
-def tree(
+def command(
     model: ModelArgument,
     leaf_size: LeafSizeOption = None,
     split: Annotated[

@@ -22,7 +22,7 @@ from palpate.cli.output import (
 )
 
 
-def tune(
+def command(
     model: ModelArgument,
     threads: ThreadsOption = 1,
     frames: Annotated[int, typer.Option(min=2, help="Frames of the motion tried.")] = 6,

@@ -14,7 +14,7 @@ from palpate.cli.output import LeafSizeOption, ThreadsOption, console, parse_sec
 from palpate.simulation import Simulation
 
 
-def view(
+def command(
     target: Annotated[
         str,
         typer.Argument(

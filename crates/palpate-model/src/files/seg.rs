@@ -1,21 +1,17 @@
 //! `.seg`: our text format of object data, specified in docs/formats.md.
 
 use std::io::{self, Read, Write};
+use std::path::Path;
 use std::str::FromStr;
 
 use super::tokens::{ReadError, Style, Tokens, quoted, syntax};
-use super::{ParseFailure, Parsed};
+use super::{FileError, FileErrorCause, Format, ParseFailure, Parsed, write_atomically};
 use crate::mesh::{ElementKind, Mesh, MeshData, Place};
 use crate::number::Shortest;
 
-/// Reads the arrays of a `.seg` stream of `size` bytes; nothing but their lengths is checked.
-///
-/// `sought` is the node or element whose line the caller wants to know.
-pub(super) fn read(
-    reader: impl Read,
-    size: u64,
-    sought: Option<Place>,
-) -> Result<Parsed, ParseFailure> {
+pub(super) const FORMAT: Format = Format { extension: "seg", read, write };
+
+fn read(reader: &mut dyn Read, size: u64, sought: Option<Place>) -> Result<Parsed, ParseFailure> {
     let mut parser = Parser {
         tokens: Tokens::new(reader, size, Style::BlanksCommasComments),
         data: MeshData::default(),
@@ -198,8 +194,16 @@ impl<R: Read> Parser<R> {
     }
 }
 
+fn write(path: &Path, mesh: &Mesh) -> Result<(), FileError> {
+    check_names(mesh).map_err(|message| {
+        let cause = FileErrorCause::Syntax(message);
+        FileError { path: path.to_owned(), line: None, cause }
+    })?;
+    write_atomically(path, |out| write_text(out, mesh))
+}
+
 /// Refuses node sets whose names the format cannot hold.
-pub(super) fn check_names(mesh: &Mesh) -> Result<(), String> {
+fn check_names(mesh: &Mesh) -> Result<(), String> {
     let unwritable = |name: &&String| {
         name.is_empty()
             || name.len() > 1000
@@ -215,7 +219,7 @@ pub(super) fn check_names(mesh: &Mesh) -> Result<(), String> {
 }
 
 /// Writes a mesh whose set names are fit for it.
-pub(super) fn write(out: &mut dyn Write, mesh: &Mesh) -> io::Result<()> {
+fn write_text(out: &mut dyn Write, mesh: &Mesh) -> io::Result<()> {
     writeln!(out, "seg 1")?;
     writeln!(out, "nodes {}", mesh.nodes().len())?;
     for node in mesh.nodes() {

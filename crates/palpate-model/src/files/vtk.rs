@@ -11,21 +11,20 @@ mod write;
 use std::io::Read;
 
 use super::tokens::{ReadError, Style, Tokens, quoted, syntax};
-use super::{ParseFailure, Parsed};
+use super::{Format, ParseFailure, Parsed};
 use crate::mesh::Place;
 use cells::Cells;
 use scalar::{Scalar, Values};
 
 pub use write::{VtkEncoding, write_vtk};
 
-/// Reads the arrays of a `.vtk` stream of `size` bytes; nothing but their lengths is checked.
-///
-/// `sought` is the node or element whose line the caller wants to know.
-pub(super) fn read(
-    reader: impl Read,
-    size: u64,
-    sought: Option<Place>,
-) -> Result<Parsed, ParseFailure> {
+pub(super) const FORMAT: Format = Format {
+    extension: "vtk",
+    read,
+    write: |path, mesh| write_vtk(path, mesh, VtkEncoding::Binary),
+};
+
+fn read(reader: &mut dyn Read, size: u64, sought: Option<Place>) -> Result<Parsed, ParseFailure> {
     let mut file = VtkFile {
         values: Values { tokens: Tokens::new(reader, size, Style::Blanks), binary: false },
         major_version: 0,
