@@ -34,7 +34,6 @@ _Changes = tuple[list[tuple[int, _Change, dict[str, Any] | None, list[int]]], di
 _Stats = tuple[float, float, float, int, int, int, int, int, int]
 
 __all__ = [
-    "LAWS",
     "MESH_EXTENSIONS",
     "METHODS",
     "Blade",
@@ -54,7 +53,6 @@ __all__ = [
 ]
 
 __version__: str
-LAWS: tuple[str, ...]
 MESH_EXTENSIONS: tuple[str, ...]
 METHODS: tuple[str, ...]
 

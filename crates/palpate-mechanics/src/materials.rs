@@ -5,7 +5,7 @@ use palpate_geometry::Point;
 use palpate_model::{Body, FIBRE_FAMILIES, Law as LawName, Material};
 
 use crate::error::MechanicsError;
-use crate::tissue::law::{FibreParameters, Lame, Law, MAX_FAMILIES};
+use crate::tissue::law::{FibreParameters, Lame, Law, MAX_FAMILIES, Parameters};
 use crate::tissue::{Tissue, TissueInput, VolumeAveraging};
 
 const _: () = assert!(MAX_FAMILIES == FIBRE_FAMILIES, "the mesh holds what the laws read");
@@ -65,22 +65,9 @@ pub(crate) fn tissue_of(body: &Body, averaging: VolumeAveraging) -> Tissue {
 }
 
 fn law_of(material: &Material, families: usize) -> Law {
-    let lame = Lame::new(material.young, material.poisson);
-    match material.law {
-        LawName::Corotated => Law::Corotated(lame),
-        LawName::SaintVenantKirchhoff => Law::SaintVenantKirchhoff(lame),
-        LawName::NeoHookean => Law::NeoHookean(lame),
-        LawName::MooneyRivlin => {
-            let c01 = 0.5 * lame.mu * material.mooney;
-            Law::MooneyRivlin { c10: 0.5 * lame.mu - c01, c01, lambda: lame.lambda }
-        }
-        LawName::HolzapfelGasserOgden => {
-            let Material { k1, k2, kappa, .. } = *material;
-            let fibres = FibreParameters { k1, k2, kappa, families };
-            Law::HolzapfelGasserOgden { matrix: lame, fibres }
-        }
-        other => panic!("{other} is no law of single elements"),
-    }
+    let Material { law, young, poisson, mooney, k1, k2, kappa, .. } = *material;
+    let fibres = FibreParameters { k1, k2, kappa, families };
+    Law::new(law, Parameters { lame: Lame::new(young, poisson), mooney, fibres })
 }
 
 /// Unit directions of the fibres of a tetrahedron, zero where there is none.

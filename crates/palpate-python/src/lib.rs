@@ -17,7 +17,7 @@ mod simulation;
 #[pyo3::pymodule]
 mod _core {
     use palpate::contact::Method;
-    use palpate::model::{Law, MESH_EXTENSIONS};
+    use palpate::model::MESH_EXTENSIONS;
     use pyo3::prelude::*;
     use pyo3::types::PyTuple;
 
@@ -36,7 +36,6 @@ mod _core {
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
         module.add("__version__", env!("CARGO_PKG_VERSION"))?;
         module.add("MESH_EXTENSIONS", PyTuple::new(module.py(), MESH_EXTENSIONS)?)?;
-        module.add("METHODS", PyTuple::new(module.py(), Method::NAMES)?)?;
-        module.add("LAWS", PyTuple::new(module.py(), Law::NAMES)?)
+        module.add("METHODS", PyTuple::new(module.py(), Method::NAMES)?)
     }
 }

@@ -1,21 +1,17 @@
-//! The constitutive laws of tissue: what a law is, and the list of them.
+//! The constitutive laws of tissue: what a law is, and the list of them in [`with_law`].
 
-mod corotated;
-mod fibres;
-mod mooney_rivlin;
-mod neo_hookean;
-mod saint_venant_kirchhoff;
+pub(super) mod corotated;
+pub(super) mod fibres;
+pub(super) mod mooney_rivlin;
+pub(super) mod neo_hookean;
+pub(super) mod saint_venant_kirchhoff;
 pub(super) mod viscosity;
+
+pub(super) use palpate_model::Law as Name;
 
 use super::matrix::Matrix;
 use super::principal::PrincipalTangent;
 use super::real::Real;
-
-pub(super) use corotated::Corotated;
-pub(super) use fibres::HolzapfelGasserOgden;
-pub(super) use mooney_rivlin::MooneyRivlin;
-pub(super) use neo_hookean::NeoHookean;
-pub(super) use saint_venant_kirchhoff::SaintVenantKirchhoff;
 
 /// Most fibre directions per tetrahedron.
 pub(crate) const MAX_FAMILIES: usize = 2;
@@ -25,62 +21,53 @@ pub(super) type Directions<R> = [[R; 3]; MAX_FAMILIES];
 
 /// A law with its parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Law {
-    /// Linear in each element's own rotating frame.
-    Corotated(Lame),
-    /// Linear between Green's strain and the second Piola-Kirchhoff stress. It gives way when it is
-    /// compressed to less than about 58 % (1/√3) of its length: for stretch only.
-    SaintVenantKirchhoff(Lame),
-    /// Stable neo-Hookean.
-    NeoHookean(Lame),
-    /// Mooney-Rivlin with a stable volumetric term: `c10 + c01` is half of the shear modulus [Pa].
-    MooneyRivlin {
-        /// Factor of the first invariant [Pa].
-        c10: f64,
-        /// Factor of the second invariant [Pa].
-        c01: f64,
-        /// Lamé's first parameter [Pa].
-        lambda: f64,
-    },
-    /// Stable neo-Hookean matrix with exponential fibres.
-    HolzapfelGasserOgden {
-        /// Elasticity of the matrix between the fibres.
-        matrix: Lame,
-        /// The fibres.
-        fibres: FibreParameters,
-    },
+pub(crate) struct Law {
+    pub(super) name: Name,
+    pub(super) parameters: Parameters,
+}
+
+/// What laws are made from; each reads what it needs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Parameters {
+    /// Elasticity at small strain; of the matrix alone where there are fibres.
+    pub(crate) lame: Lame,
+    /// Share of the second invariant in Mooney-Rivlin, 0 to 1.
+    pub(crate) mooney: f64,
+    /// The fibres of Holzapfel-Gasser-Ogden.
+    pub(crate) fibres: FibreParameters,
+}
+
+/// Without fibres, and halfway between the invariants.
+impl From<Lame> for Parameters {
+    fn from(lame: Lame) -> Self {
+        let fibres = FibreParameters { k1: 0.0, k2: 1.0, kappa: 0.0, families: 0 };
+        Self { lame, mooney: 0.5, fibres }
+    }
 }
 
 impl Law {
+    /// # Panics
+    /// For the linear law, which is none of single elements.
+    pub(crate) fn new(name: Name, parameters: Parameters) -> Self {
+        assert!(name != Name::Linear, "{name} is no law of single elements");
+        Self { name, parameters }
+    }
+
     /// Lamé parameters at small strain; of the matrix alone where there are fibres.
     pub(crate) fn lame(&self) -> Lame {
-        match *self {
-            Self::Corotated(lame)
-            | Self::SaintVenantKirchhoff(lame)
-            | Self::NeoHookean(lame)
-            | Self::HolzapfelGasserOgden { matrix: lame, .. } => lame,
-            Self::MooneyRivlin { c10, c01, lambda } => Lame { mu: 2.0 * (c10 + c01), lambda },
-        }
+        self.parameters.lame
     }
 
     /// The same law with another resistance to change of volume.
-    pub(super) fn with_lambda(self, lambda: f64) -> Self {
-        let replace = |lame: Lame| Lame { lambda, ..lame };
-        match self {
-            Self::Corotated(lame) => Self::Corotated(replace(lame)),
-            Self::SaintVenantKirchhoff(lame) => Self::SaintVenantKirchhoff(replace(lame)),
-            Self::NeoHookean(lame) => Self::NeoHookean(replace(lame)),
-            Self::MooneyRivlin { c10, c01, .. } => Self::MooneyRivlin { c10, c01, lambda },
-            Self::HolzapfelGasserOgden { matrix, fibres } => {
-                Self::HolzapfelGasserOgden { matrix: replace(matrix), fibres }
-            }
-        }
+    pub(super) fn with_lambda(mut self, lambda: f64) -> Self {
+        self.parameters.lame.lambda = lambda;
+        self
     }
 
     /// Fibre directions that the law reads.
     pub(crate) fn families(&self) -> usize {
-        match self {
-            Self::HolzapfelGasserOgden { fibres, .. } => fibres.families,
+        match self.name {
+            Name::HolzapfelGasserOgden => self.parameters.fibres.families,
             _ => 0,
         }
     }
@@ -105,7 +92,7 @@ impl Lame {
     }
 }
 
-/// Parameters of the fibres of [`Law::HolzapfelGasserOgden`], the same for each family.
+/// Parameters of fibres, the same for each family.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct FibreParameters {
     /// Stiffness at small stretch [Pa].
@@ -150,35 +137,25 @@ pub(super) struct FibreTangent<R> {
     pub(super) steepness: R,
 }
 
-/// Runs `$body` with `$law` bound to the concrete law.
+/// Runs `$body` with `$law` bound to the concrete law. A law is a file and its line here.
 macro_rules! with_law {
-    ($choice:expr, $law:ident => $body:expr) => {
-        match $choice {
-            Law::Corotated(lame) => {
-                let $law = law::Corotated::new(lame);
-                $body
-            }
-            Law::SaintVenantKirchhoff(lame) => {
-                let $law = law::SaintVenantKirchhoff::new(lame);
-                $body
-            }
-            Law::NeoHookean(lame) => {
-                let $law = law::NeoHookean::new(lame);
-                $body
-            }
-            Law::MooneyRivlin { c10, c01, lambda } => {
-                let $law = law::MooneyRivlin::new(c10, c01, lambda);
-                $body
-            }
-            Law::HolzapfelGasserOgden { matrix, fibres } if fibres.families == 1 => {
-                let $law = law::HolzapfelGasserOgden::<1>::new(matrix, fibres);
-                $body
-            }
-            Law::HolzapfelGasserOgden { matrix, fibres } => {
-                let $law = law::HolzapfelGasserOgden::<2>::new(matrix, fibres);
-                $body
-            }
+    (@ $kind:ty, $from:ident, $law:ident => $body:expr) => {{
+        let $law = <$kind>::new($from);
+        $body
+    }};
+    ($choice:expr, $law:ident => $body:expr) => {{
+        use law::Name;
+
+        let law::Law { name, parameters: p } = &$choice;
+        match name {
+            Name::Corotated => with_law!(@ law::corotated::Corotated, p, $law => $body),
+            Name::SaintVenantKirchhoff => with_law!(@ law::saint_venant_kirchhoff::SaintVenantKirchhoff, p, $law => $body),
+            Name::NeoHookean => with_law!(@ law::neo_hookean::NeoHookean, p, $law => $body),
+            Name::MooneyRivlin => with_law!(@ law::mooney_rivlin::MooneyRivlin, p, $law => $body),
+            Name::HolzapfelGasserOgden if p.fibres.families == 1 => with_law!(@ law::fibres::HolzapfelGasserOgden<1>, p, $law => $body),
+            Name::HolzapfelGasserOgden => with_law!(@ law::fibres::HolzapfelGasserOgden<2>, p, $law => $body),
+            other => unreachable!("{other} is no law of single elements"),
         }
-    };
+    }};
 }
 pub(super) use with_law;

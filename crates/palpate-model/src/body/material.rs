@@ -9,45 +9,40 @@ use serde::{Deserialize, Serialize};
 use super::BodyError;
 use crate::mesh::FIBRE_FAMILIES;
 
-/// Constitutive law of a material.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
-#[non_exhaustive]
-pub enum Law {
-    /// Linear elasticity in the body's own rotating frame.
-    #[default]
-    Linear,
-    /// Linear elasticity in each element's rotating frame.
-    Corotated,
-    /// St. Venant-Kirchhoff.
-    SaintVenantKirchhoff,
-    /// Stable neo-Hookean.
-    NeoHookean,
-    /// Mooney-Rivlin.
-    MooneyRivlin,
-    /// Holzapfel-Gasser-Ogden: neo-Hookean with fibres.
-    HolzapfelGasserOgden,
+/// The laws from lines of a name here and a name in the language.
+macro_rules! laws {
+    ($($(#[$about:meta])* $name:ident = $word:literal,)*) => {
+        /// Constitutive law of a material.
+        #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+        #[non_exhaustive]
+        pub enum Law {
+            $($(#[$about])* $name,)*
+        }
+
+        impl Law {
+            /// All laws.
+            pub const ALL: [Self; [$($word),*].len()] = [$(Self::$name),*];
+            /// Their names in the language, in the same order.
+            pub const NAMES: [&'static str; Self::ALL.len()] = [$($word),*];
+        }
+    };
 }
 
-impl Law {
-    const ALL: [(Self, &'static str); 6] = [
-        (Self::Linear, "linear"),
-        (Self::Corotated, "corotated"),
-        (Self::SaintVenantKirchhoff, "stvk"),
-        (Self::NeoHookean, "neo-hookean"),
-        (Self::MooneyRivlin, "mooney-rivlin"),
-        (Self::HolzapfelGasserOgden, "hgo"),
-    ];
-
-    /// Names of all laws in the language.
-    pub const NAMES: [&'static str; 6] = {
-        let mut names = [""; 6];
-        let mut index = 0;
-        while index < names.len() {
-            names[index] = Self::ALL[index].1;
-            index += 1;
-        }
-        names
-    };
+// Checkpoints keep the place in this list: a new one comes last.
+laws! {
+    /// Linear elasticity in the body's own rotating frame.
+    #[default]
+    Linear = "linear",
+    /// Linear elasticity in each element's rotating frame.
+    Corotated = "corotated",
+    /// St. Venant-Kirchhoff.
+    SaintVenantKirchhoff = "stvk",
+    /// Stable neo-Hookean.
+    NeoHookean = "neo-hookean",
+    /// Mooney-Rivlin.
+    MooneyRivlin = "mooney-rivlin",
+    /// Holzapfel-Gasser-Ogden: neo-Hookean with fibres.
+    HolzapfelGasserOgden = "hgo",
 }
 
 impl fmt::Display for Law {
@@ -60,8 +55,8 @@ impl FromStr for Law {
     type Err = BodyError;
 
     fn from_str(name: &str) -> Result<Self, BodyError> {
-        let found = Self::ALL.into_iter().find(|(_, known)| *known == name);
-        found.map(|(law, _)| law).ok_or_else(|| BodyError::UnknownLaw(name.to_owned()))
+        let found = Self::NAMES.iter().position(|known| *known == name);
+        found.map(|index| Self::ALL[index]).ok_or_else(|| BodyError::UnknownLaw(name.to_owned()))
     }
 }
 

@@ -8,7 +8,7 @@
 use super::super::matrix::{self, Matrix};
 use super::super::principal::{OTHERS, PrincipalTangent};
 use super::super::real::Real;
-use super::{Directions, ElementLaw, Lame};
+use super::{Directions, ElementLaw, Lame, Parameters};
 
 #[derive(Clone, Copy)]
 pub(in super::super) struct Corotated {
@@ -16,8 +16,8 @@ pub(in super::super) struct Corotated {
 }
 
 impl Corotated {
-    pub(in super::super) fn new(lame: Lame) -> Self {
-        Self { lame }
+    pub(in super::super) fn new(parameters: &Parameters) -> Self {
+        Self { lame: parameters.lame }
     }
 }
 

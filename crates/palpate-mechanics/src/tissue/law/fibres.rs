@@ -12,7 +12,8 @@ use super::super::dual::Dual;
 use super::super::matrix::{self, Matrix};
 use super::super::principal::PrincipalTangent;
 use super::super::real::{Real, positive_part};
-use super::{Directions, ElementLaw, FibreParameters, FibreTangent, Lame, NeoHookean};
+use super::neo_hookean::NeoHookean;
+use super::{Directions, ElementLaw, FibreParameters, FibreTangent, Parameters};
 
 /// e^40 = 2e17: far beyond what any fibre survives.
 const LARGEST_EXPONENT: f64 = 40.0;
@@ -24,8 +25,8 @@ pub(in super::super) struct HolzapfelGasserOgden<const FAMILIES: usize> {
 }
 
 impl<const FAMILIES: usize> HolzapfelGasserOgden<FAMILIES> {
-    pub(in super::super) fn new(matrix: Lame, fibres: FibreParameters) -> Self {
-        Self { matrix: NeoHookean::new(matrix), fibres }
+    pub(in super::super) fn new(parameters: &Parameters) -> Self {
+        Self { matrix: NeoHookean::new(parameters), fibres: parameters.fibres }
     }
 
     /// The positive part of e, and `F a`.

@@ -10,7 +10,7 @@
 use super::super::matrix::{self, Matrix};
 use super::super::principal::{OTHERS, PrincipalTangent};
 use super::super::real::Real;
-use super::{Directions, ElementLaw};
+use super::{Directions, ElementLaw, Parameters};
 
 #[derive(Clone, Copy)]
 pub(in super::super) struct MooneyRivlin {
@@ -20,8 +20,10 @@ pub(in super::super) struct MooneyRivlin {
 }
 
 impl MooneyRivlin {
-    pub(in super::super) fn new(c10: f64, c01: f64, lambda: f64) -> Self {
-        Self { c10, c01, bulk: lambda + 2.0 * c10 }
+    pub(in super::super) fn new(&Parameters { lame, mooney, .. }: &Parameters) -> Self {
+        let c01 = 0.5 * lame.mu * mooney;
+        let c10 = 0.5 * lame.mu - c01;
+        Self { c10, c01, bulk: lame.lambda + 2.0 * c10 }
     }
 
     fn rest_pressure(&self) -> f64 {

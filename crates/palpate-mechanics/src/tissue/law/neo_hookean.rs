@@ -10,7 +10,7 @@
 use super::super::matrix::{self, Matrix};
 use super::super::principal::PrincipalTangent;
 use super::super::real::Real;
-use super::{Directions, ElementLaw, Lame};
+use super::{Directions, ElementLaw, Parameters};
 
 #[derive(Clone, Copy)]
 pub(in super::super) struct NeoHookean {
@@ -19,7 +19,7 @@ pub(in super::super) struct NeoHookean {
 }
 
 impl NeoHookean {
-    pub(in super::super) fn new(lame: Lame) -> Self {
+    pub(in super::super) fn new(Parameters { lame, .. }: &Parameters) -> Self {
         Self { shear: 4.0 / 3.0 * lame.mu, bulk: lame.lambda + 5.0 / 6.0 * lame.mu }
     }
 }

@@ -7,7 +7,7 @@
 use super::super::matrix::{self, Matrix};
 use super::super::principal::{OTHERS, PrincipalTangent};
 use super::super::real::Real;
-use super::{Directions, ElementLaw, Lame};
+use super::{Directions, ElementLaw, Lame, Parameters};
 
 #[derive(Clone, Copy)]
 pub(in super::super) struct SaintVenantKirchhoff {
@@ -15,8 +15,8 @@ pub(in super::super) struct SaintVenantKirchhoff {
 }
 
 impl SaintVenantKirchhoff {
-    pub(in super::super) fn new(lame: Lame) -> Self {
-        Self { lame }
+    pub(in super::super) fn new(parameters: &Parameters) -> Self {
+        Self { lame: parameters.lame }
     }
 }
 

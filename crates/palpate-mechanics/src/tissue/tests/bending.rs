@@ -5,7 +5,7 @@ use std::sync::Arc;
 use palpate_geometry::Point;
 use palpate_solver::{BlockMatrix, Cholesky};
 
-use super::super::law::{Lame, Law};
+use super::super::law::{Lame, Law, Name};
 use super::super::{Tissue, TissueInput, VolumeAveraging};
 use super::support::{block, inner, moved};
 
@@ -117,7 +117,7 @@ impl Membrane {
 
 #[test]
 fn membranes_of_nearly_incompressible_tissue_bend() {
-    let law = Law::NeoHookean(Lame::new(1.0, 0.4999));
+    let law = Law::new(Name::NeoHookean, Lame::new(1.0, 0.4999).into());
     let deflection = |cells: usize, averaging: VolumeAveraging| {
         let membrane = Membrane::new(cells);
         membrane.solve(law, averaging)[membrane.corner][1] / LOAD / EXACT

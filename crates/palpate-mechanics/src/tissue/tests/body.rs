@@ -7,7 +7,7 @@ use palpate_geometry::Point;
 use palpate_solver::BlockMatrix;
 use proptest::prelude::*;
 
-use super::super::law::{Lame, Law};
+use super::super::law::{Lame, Law, Name};
 use super::super::{Inverted, Tissue, TissueInput, VolumeAveraging, von_mises};
 use super::support::{TestBody, YOUNG, block, inner, laws, matrix, moved, norm, stress};
 
@@ -256,9 +256,9 @@ fn inner_nodes_are_in_balance_under_uniform_deformation() {
     let x: Vec<Point> = rest.iter().map(|&x| (f * DVec3::from_array(x)).to_array()).collect();
     for poisson in [0.3, 0.499] {
         for law in [
-            Law::Corotated(Lame::new(YOUNG, poisson)),
-            Law::SaintVenantKirchhoff(Lame::new(YOUNG, poisson)),
-            Law::NeoHookean(Lame::new(YOUNG, poisson)),
+            Law::new(Name::Corotated, Lame::new(YOUNG, poisson).into()),
+            Law::new(Name::SaintVenantKirchhoff, Lame::new(YOUNG, poisson).into()),
+            Law::new(Name::NeoHookean, Lame::new(YOUNG, poisson).into()),
         ] {
             let mut tissue = Tissue::new(&TissueInput {
                 rest: &rest,
@@ -285,7 +285,7 @@ fn inverted_elements_are_counted() {
     let mut tissue = Tissue::new(&TissueInput {
         rest: &rest,
         tetrahedra: &tetrahedra,
-        laws: &[Law::NeoHookean(Lame::new(YOUNG, 0.3))],
+        laws: &[Law::new(Name::NeoHookean, Lame::new(YOUNG, 0.3).into())],
         regions: &[],
         fibres: &[],
         viscosity: 0.0,

@@ -8,7 +8,7 @@ use palpate_geometry::Point;
 use palpate_solver::BlockMatrix;
 use proptest::prelude::*;
 
-use super::super::law::{self, Directions, ElementLaw, Law, with_law};
+use super::super::law::{self, Directions, ElementLaw, Law, Name, with_law};
 use super::super::projection::without_negative;
 use super::super::real::Real;
 use super::super::{ELEMENT_RATIO, STIFF_RATIO, Tissue, TissueInput, VolumeAveraging, dual};
@@ -95,9 +95,9 @@ fn largest(tangent: &Tangent) -> f64 {
 }
 
 fn without_fibres(law: Law) -> Law {
-    match law {
-        Law::HolzapfelGasserOgden { matrix, .. } => Law::NeoHookean(matrix),
-        other => other,
+    match law.name {
+        Name::HolzapfelGasserOgden => Law::new(Name::NeoHookean, law.parameters),
+        _ => law,
     }
 }
 
@@ -111,7 +111,7 @@ proptest! {
         let f = if upright { f + DMat3::IDENTITY } else { f };
         for law in laws() {
             // A corotated element jumps where two stretches cancel.
-            prop_assume!(!matches!(law, Law::Corotated(_)) || f.determinant() > 0.02);
+            prop_assume!(law.name != Name::Corotated || f.determinant() > 0.02);
             let mu = law.lame().mu;
             let law = if stiff { law.with_lambda(60.0 * mu) } else { law };
             let (element, pressure, slope) = if stiff {

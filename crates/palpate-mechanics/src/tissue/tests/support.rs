@@ -4,7 +4,9 @@ use glam::{DMat3, DQuat, DVec3};
 use palpate_geometry::Point;
 use proptest::prelude::*;
 
-use super::super::law::{self, Directions, ElementLaw, FibreParameters, Lame, Law, with_law};
+use super::super::law::{
+    self, Directions, ElementLaw, FibreParameters, Lame, Law, Name, Parameters, with_law,
+};
 use super::super::matrix::Matrix;
 use super::super::{Tissue, TissueInput, VolumeAveraging};
 
@@ -14,18 +16,24 @@ pub(super) const POISSON: f64 = 0.4;
 /// Every law, with the same elasticity at small strain (the matrix alone where there are fibres).
 pub(super) fn laws() -> Vec<Law> {
     let lame = Lame::new(YOUNG, POISSON);
-    let hgo = |kappa, families| Law::HolzapfelGasserOgden {
-        matrix: lame,
-        fibres: FibreParameters { k1: 900.0, k2: 2.0, kappa, families },
+    let hgo = |kappa, families| {
+        let fibres = FibreParameters { k1: 900.0, k2: 2.0, kappa, families };
+        Law::new(Name::HolzapfelGasserOgden, Parameters { fibres, ..lame.into() })
     };
     vec![
-        Law::Corotated(lame),
-        Law::SaintVenantKirchhoff(lame),
-        Law::NeoHookean(lame),
-        Law::MooneyRivlin { c10: 0.35 * lame.mu, c01: 0.15 * lame.mu, lambda: lame.lambda },
+        Law::new(Name::Corotated, lame.into()),
+        Law::new(Name::SaintVenantKirchhoff, lame.into()),
+        Law::new(Name::NeoHookean, lame.into()),
+        Law::new(Name::MooneyRivlin, Parameters { mooney: 0.3, ..lame.into() }),
         hgo(0.0, 1),
         hgo(0.2, 2),
     ]
+}
+
+/// Factors `c10`, `c01` [Pa] of the two invariants in Mooney-Rivlin.
+pub(super) fn mooney_factors(law: Law) -> [f64; 2] {
+    let half = 0.5 * law.parameters.lame.mu;
+    [half * (1.0 - law.parameters.mooney), half * law.parameters.mooney]
 }
 
 /// Two unit directions that are neither parallel nor along an axis.
