@@ -30,7 +30,8 @@ ALLOWED = {
 }
 
 
-#: METIS is called through its C interface; SIMD intrinsics stand in one file; the fuzzer counts memory.
+#: METIS is called through its C interface; SIMD intrinsics stand in one file; the fuzzer counts
+#: memory.
 UNSAFE = {"metis.rs", "simd.rs", "counting_allocator.rs"}
 
 
