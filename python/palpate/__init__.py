@@ -27,7 +27,7 @@ from palpate.errors import (
     SimulationError,
 )
 from palpate.files import read_mesh, write_mesh
-from palpate.hands import Drive, Pull, Tool
+from palpate.hands import Drive, Pull, Tool, ToolLoop
 from palpate.mesh import Defect, Mesh
 from palpate.meshing import label_surface, mesh_image, mesh_surface
 from palpate.model import (
@@ -78,6 +78,7 @@ __all__ = [
     "StepReport",
     "Stroke",
     "Tool",
+    "ToolLoop",
     "TreeElement",
     "__version__",
     "label_surface",

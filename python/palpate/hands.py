@@ -14,6 +14,8 @@ from palpate._arrays import Float64Array
 # How far the columns of a rotation matrix may be off right angles and length 1.
 _ROTATION_TOLERANCE = 1e-6
 
+_IDENTITY = np.eye(3)
+
 _RELEASED = "this was released before, or belongs to another state"
 
 
@@ -233,8 +235,104 @@ class Tool:
         """Torque of all contacts on the tool [N m] about its `translation`, shape (3,)."""
         return np.array(self._core.tool_force(self._index)[1])
 
+    def loop(self, *, margin: float | None = None) -> ToolLoop:
+        """A loop in which the tool feels tissue between steps, at 1 kHz.
+
+        Call `ToolLoop.tick` from a thread of its own while another one calls `Simulation.step`:
+        every step moves the tool to the pose of the newest tick, and tells the loop how the tissue
+        near the tool lies and answers.
+
+        Parameters
+        ----------
+        margin : float
+            Tissue within this distance [m] of the tool gives way, beside what it can reach until
+            the next step; 1.5 mean edges of the tissue's surface unless given.
+
+        Notes
+        -----
+        A tool has one loop: an earlier one gets no news any more.
+        """
+        margin = None if margin is None else _arrays.scalar(margin, "margin")
+        return ToolLoop(self._core.tool_loop(self._index, margin), self._name)
+
     def __repr__(self) -> str:
         return f"Tool({self._name!r})"
+
+
+class ToolLoop:
+    """A tool that feels tissue between the steps of a simulation, made by `Tool.loop`.
+
+    Between two steps the tissue is as the last one left it and gives way with its own compliance
+    within a step, inertia included; contact and friction obey the laws of the step.
+    """
+
+    def __init__(self, core: _core.ToolLoop, name: str) -> None:
+        self._core = core
+        self._name = name
+        self._contacts = 0
+        self._step = 0
+
+    def tick(
+        self, rotation: npt.ArrayLike, translation: npt.ArrayLike
+    ) -> tuple[Float64Array, Float64Array]:
+        """Move the tool; what it feels there.
+
+        Parameters
+        ----------
+        rotation : (3, 3) or (4,)
+            Rotation matrix, or quaternion with the real part first, as in `Tool.set_pose`.
+        translation : (3,)
+            Where the origin of its mesh file is [m].
+
+        Returns
+        -------
+        force : (3,) float64
+            Of all contacts on the tool [N].
+        torque : (3,) float64
+            About ``translation`` [N m].
+
+        Raises
+        ------
+        ValueError
+            If the rotation is none, or a number is not finite; the tool has not moved then.
+        """
+        matrix = np.asarray(rotation)
+        if matrix.shape != (3, 3) or matrix.dtype != np.float64 or not _is_rotation(matrix):
+            matrix = _matrix(_quaternion(rotation))
+        place = _arrays.vector(translation, "translation")
+        force, torque, self._contacts, self._step = self._core.tick(matrix.tolist(), place)
+        return np.array(force), np.array(torque)
+
+    @property
+    def contacts(self) -> int:
+        """Contacts that carried a force in the last tick."""
+        return self._contacts
+
+    @property
+    def step(self) -> int:
+        """Number of the step whose outcome the last tick has worked on."""
+        return self._step
+
+    def __repr__(self) -> str:
+        return f"ToolLoop({self._name!r})"
+
+
+def _is_rotation(matrix: Float64Array) -> bool:
+    off = matrix @ matrix.T - _IDENTITY
+    turned = float(np.dot(np.cross(matrix[0], matrix[1]), matrix[2]))
+    return bool(np.abs(off).max() <= _ROTATION_TOLERANCE and turned > 0)
+
+
+def _matrix(quaternion: tuple[float, float, float, float]) -> Float64Array:
+    """The rotation matrix of a unit quaternion, real part first."""
+    w, x, y, z = quaternion
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
 
 
 def _quaternion(rotation: npt.ArrayLike) -> tuple[float, float, float, float]:

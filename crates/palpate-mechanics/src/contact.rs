@@ -7,9 +7,11 @@ mod gauss_seidel;
 pub(crate) mod last_forces;
 mod law;
 mod node_compliance;
+mod patch;
 pub(crate) mod problem;
 pub(crate) mod response;
 mod surface;
+mod touch;
 #[cfg(test)]
 mod twin;
 
@@ -18,7 +20,9 @@ use palpate_geometry::Point;
 use palpate_model::Body;
 
 use crate::error::{MechanicsError, check_parameters};
+pub use patch::{Patch, PatchMemory};
 pub(crate) use surface::Surface;
+pub use touch::Touch;
 
 /// A contact that carried a force in the last step.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -4,6 +4,7 @@ mod change;
 mod drive;
 mod failure;
 mod hands;
+mod patch;
 mod substeps;
 
 use std::collections::BTreeMap;

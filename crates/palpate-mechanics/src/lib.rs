@@ -14,7 +14,7 @@ mod state;
 mod ties;
 mod tissue;
 
-pub use contact::Contact;
+pub use contact::{Contact, Patch, PatchMemory, Touch};
 pub use dynamics::{Cause, Drive, Dynamics, DynamicsOptions, Failure, StageTimes, StepStats};
 pub use energy::{Energy, Momentum};
 pub use error::MechanicsError;

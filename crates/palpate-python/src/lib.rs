@@ -12,6 +12,7 @@ mod mesh;
 mod model;
 mod scene;
 mod simulation;
+mod tool_loop;
 
 /// The compiled core of palpate.
 #[pyo3::pymodule]
@@ -31,6 +32,8 @@ mod _core {
     use crate::scene::PyScene;
     #[pymodule_export]
     use crate::simulation::{PySimulation, PySnapshot, von_mises};
+    #[pymodule_export]
+    use crate::tool_loop::PyToolLoop;
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {

@@ -19,6 +19,7 @@ use crate::cutting::{self, ChangeColumns, Options, PyBlade, change_columns, repo
 use crate::errors::raise;
 use crate::model::PyModel;
 use crate::scene::{StatsRow, intersection_rows, level_boxes, scene_options};
+use crate::tool_loop::PyToolLoop;
 
 /// A state to come back to.
 #[pyclass(frozen, name = "Snapshot", module = "palpate._core")]
@@ -312,6 +313,11 @@ impl PySimulation {
     fn tool_force(&self, py: Python<'_>, body: usize) -> PyResult<(Vec3, Vec3)> {
         let [force, torque] = raise(py, self.lock().tool_force(body))?;
         Ok((force.into(), torque.into()))
+    }
+
+    fn tool_loop(&self, py: Python<'_>, body: usize, margin: Option<f64>) -> PyResult<PyToolLoop> {
+        let made = raise(py, py.detach(|| self.lock().tool_loop(body, margin)))?;
+        Ok(PyToolLoop { tool_loop: Mutex::new(made) })
     }
 
     fn cut<'py>(

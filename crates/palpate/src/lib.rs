@@ -15,6 +15,7 @@
 
 mod checkpoint;
 mod simulation;
+mod tool_loop;
 
 pub use checkpoint::CheckpointError;
 pub use palpate_contact as contact;
@@ -30,3 +31,4 @@ pub use simulation::{
     BodyChange, ChangeReport, ChangeTimes, Simulation, SimulationError, SimulationOptions,
     Snapshot, StepReport, StepTimes, Substeps,
 };
+pub use tool_loop::{ToolForce, ToolLoop};

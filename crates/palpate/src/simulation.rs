@@ -3,6 +3,7 @@
 mod change;
 mod drive;
 mod hands;
+mod loops;
 mod substeps;
 
 use std::ops::AddAssign;
@@ -18,6 +19,7 @@ use palpate_mechanics::{
 use palpate_model::{MeshError, Model};
 
 pub use change::{BodyChange, ChangeReport, ChangeTimes, Snapshot};
+use loops::Link;
 use substeps::Finer;
 pub use substeps::Substeps;
 
@@ -95,6 +97,9 @@ pub enum SimulationError {
     /// A snapshot of another simulation.
     #[error("the snapshot is of a simulation of another model")]
     OtherModel,
+    /// A margin that is not positive.
+    #[error("the margin is {0} m; expected a positive number")]
+    Margin(f64),
     /// A body index that does not exist.
     #[error("body {index} does not exist: the simulation has {count} bodies")]
     NoSuchBody {
@@ -169,7 +174,7 @@ pub struct StepReport {
 }
 
 /// What contacts are made of.
-const CONTACT_PAIRS: ProximityOptions =
+pub(crate) const CONTACT_PAIRS: ProximityOptions =
     ProximityOptions { close_at_rest: true, each_feature_once: true };
 
 impl StepReport {
@@ -201,6 +206,7 @@ pub struct Simulation {
     penetration: Vec<PenetratingNode>,
     /// For steps that are tried again, once there was one.
     finer: Option<Box<Finer>>,
+    loops: Vec<Link>,
 }
 
 impl Simulation {
@@ -221,7 +227,16 @@ impl Simulation {
         let dynamics = Dynamics::new(&model, DynamicsOptions { time_step, threads })?;
         let initial = Snapshot { model: Arc::clone(&model), state: dynamics.state() };
         let penetration = Vec::new();
-        Ok(Self { model, options, scene, dynamics, initial, penetration, finer: None })
+        Ok(Self {
+            model,
+            options,
+            scene,
+            dynamics,
+            initial,
+            penetration,
+            finer: None,
+            loops: Vec::new(),
+        })
     }
 
     /// Moves everything on by one time step.
@@ -230,13 +245,16 @@ impl Simulation {
     /// If the step fails, with [`Substeps::Auto`] also in smaller ones; the state is then that before the
     /// step, bit for bit.
     pub fn step(&mut self) -> Result<StepReport, SimulationError> {
+        self.follow_loops()?;
         self.dynamics.set_strict(self.options.substeps == Substeps::Auto);
-        match self.advance(1) {
+        let report = match self.advance(1) {
             Err(SimulationError::Mechanics(MechanicsError::Step(failure))) => {
                 self.try_again(failure)
             }
             other => other,
-        }
+        }?;
+        self.publish()?;
+        Ok(report)
     }
 
     /// One step of the dynamics, `left` of which are left in which targets are reached.
@@ -411,7 +429,16 @@ impl Simulation {
         let (scene, dynamics) = change::parts(&model, options, &state)?;
         let initial = Snapshot { model: Arc::clone(&model), state };
         let penetration = Vec::new();
-        Ok(Self { model, options, scene, dynamics, initial, penetration, finer: None })
+        Ok(Self {
+            model,
+            options,
+            scene,
+            dynamics,
+            initial,
+            penetration,
+            finer: None,
+            loops: Vec::new(),
+        })
     }
 
     /// Cauchy stress [Pa] of each tetrahedron: xx, yy, zz, xy, yz, xz. `None` for rigid bodies and for the

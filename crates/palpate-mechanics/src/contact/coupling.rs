@@ -266,6 +266,6 @@ impl pulp::WithSimd for AddColumns<'_> {
     }
 }
 
-fn add_columns(columns: &[(&[f32], Vec3)], sums: &mut [f32]) {
+pub(super) fn add_columns(columns: &[(&[f32], Vec3)], sums: &mut [f32]) {
     pulp::Arch::new().dispatch(AddColumns { columns, sums });
 }

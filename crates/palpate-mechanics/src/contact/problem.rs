@@ -47,6 +47,11 @@ pub(crate) struct Block {
 }
 
 impl Block {
+    /// A block that belongs to no problem.
+    pub(super) fn alone(axes: DMat3, free: DVec3, own: DMat3) -> Self {
+        Self { axes, free, own, places: [Place::default(); 2], place_count: 0 }
+    }
+
     /// Writes the equations of a candidate whose places are known.
     fn fill<'a>(
         &mut self,
@@ -327,7 +332,7 @@ fn gives_way(body: &MovingBody, node: u32) -> bool {
 }
 
 /// The normal and the two tangents along which `own` is uncoupled.
-fn principal_axes(normal: DVec3, own: DMat3) -> DMat3 {
+pub(super) fn principal_axes(normal: DVec3, own: DMat3) -> DMat3 {
     let (first, second) = normal.any_orthonormal_pair();
     let (a, b, c) = (first.dot(own * first), second.dot(own * second), first.dot(own * second));
     // By the angle whose double has the direction (a - b, 2 c).
