@@ -1,5 +1,7 @@
 """Springs and tools from Python."""
 
+import threading
+
 import numpy as np
 import pytest
 
@@ -183,3 +185,92 @@ def test_bad_drives(
         simulation.drive(0, nodes, path)
     assert len(simulation.model.bodies[0].fixed_nodes) == 0
     simulation.step()
+
+
+def press(make_box) -> palpate.Simulation:
+    """A block that stands on its fixed lower side, and a smaller one above it for a tool."""
+    block = make_box((6, 6, 4), size=0.1)
+    height = block.nodes[:, 2]
+    tool = make_box((1, 1, 1), size=0.04, origin=(0.03, 0.03, 0.12))
+    tool = palpate.Mesh(tool.nodes, triangles=tool.triangles)
+    bodies = [
+        palpate.Body(
+            block,
+            name="block",
+            material=palpate.Material(young=5e3, damping=0.05),
+            fixed_nodes=np.flatnonzero(height == height.min()),
+            contact=palpate.Contact(friction=0.3),
+        ),
+        palpate.Body(tool, name="tool", rigid=(), contact=palpate.Contact(friction=0.3)),
+    ]
+    return palpate.Simulation(palpate.Model(bodies, gravity=(0, 0, 0)))
+
+
+def test_a_loop_gives_the_force_of_the_steps_at_rest(make_box):
+    simulation = press(make_box)
+    tool = simulation.tool("tool")
+    loop = tool.loop()
+    assert repr(loop) == "ToolLoop('tool')"
+    force, torque = loop.tick(np.eye(3), [0, 0, 0])
+    np.testing.assert_array_equal([force, torque], np.zeros((2, 3)))
+    assert (loop.contacts, loop.step) == (0, 0)
+    turn = np.deg2rad(3.0)
+    for step in range(150):
+        depth = min(step * 1e-3, 0.024)
+        quaternion = [np.cos(turn / 2), 0, 0, np.sin(turn / 2)]
+        force, torque = loop.tick(quaternion, [0, 0, -depth])
+        simulation.step()
+        np.testing.assert_allclose(tool.translation, [0, 0, -depth], atol=1e-15)
+    matrix = [[np.cos(turn), -np.sin(turn), 0], [np.sin(turn), np.cos(turn), 0], [0, 0, 1]]
+    force, torque = loop.tick(matrix, [0, 0, -depth])
+    assert loop.step == 150
+    assert loop.contacts > 0
+    assert force[2] > 0.1
+    np.testing.assert_allclose(force, tool.force, atol=0.01 * tool.force[2])
+    np.testing.assert_allclose(torque, tool.torque, atol=0.01 * tool.force[2] * 0.1)
+
+
+def test_a_loop_ticks_while_another_thread_steps(make_box):
+    simulation = press(make_box)
+    loop = simulation.tool("tool").loop(margin=0.02)
+    forces = []
+    done = threading.Event()
+
+    def ticks():
+        while not done.is_set():
+            forces.append(loop.tick(np.eye(3), [0, 0, -0.024])[0][2])
+
+    thread = threading.Thread(target=ticks)
+    thread.start()
+    try:
+        simulation.step(60)
+    finally:
+        done.set()
+        thread.join()
+    assert len(forces) > 60
+    assert np.isfinite(forces).all()
+    assert forces[-1] > 0.1
+    assert loop.step > 0
+
+
+@pytest.mark.parametrize(
+    ("rotation", "translation", "message"),
+    [
+        (2 * np.eye(3), [0, 0, 0], "expected a rotation matrix"),
+        (np.eye(2), [0, 0, 0], "expected shape"),
+        (np.eye(3), [0, 0, np.inf], "translation: expected finite numbers"),
+        (np.eye(3), [0, 0], "translation: expected shape"),
+    ],
+)
+def test_bad_ticks(make_box, rotation, translation, message):
+    loop = press(make_box).tool("tool").loop()
+    with pytest.raises(ValueError, match=message):
+        loop.tick(rotation, translation)
+
+
+def test_what_has_no_loop(make_box):
+    simulation = press(make_box)
+    with pytest.raises(palpate.SimulationError, match="the margin is -1 m"):
+        simulation.tool("tool").loop(margin=-1)
+    with pytest.raises(TypeError, match="margin"):
+        simulation.tool("tool").loop(margin="far")

@@ -43,6 +43,7 @@ __all__ = [
     "Scene",
     "Simulation",
     "Snapshot",
+    "ToolLoop",
     "__version__",
     "format_model",
     "load_model",

@@ -53,7 +53,7 @@ pub struct ToolLoop {
     time_step: f64,
     model: Arc<Model>,
     pairs: Vec<Pair>,
-    current: Option<Box<Publication>>,
+    current: Option<Publication>,
     /// Nodes of the tool now and in the last tick [m].
     now: Vec<Point>,
     before: Vec<Point>,

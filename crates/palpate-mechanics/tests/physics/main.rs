@@ -11,4 +11,5 @@ mod friction;
 mod hands;
 mod impact;
 mod nonlinear;
+mod patch;
 mod world;

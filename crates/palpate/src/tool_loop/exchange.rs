@@ -34,9 +34,9 @@ pub(crate) struct Organ {
 
 #[derive(Default)]
 struct Slots {
-    fresh: Option<Box<Publication>>,
+    fresh: Option<Publication>,
     /// Memory for the next one.
-    spare: Option<Box<Publication>>,
+    spare: Option<Publication>,
     pose: Option<(DQuat, Point)>,
 }
 
@@ -52,11 +52,11 @@ impl Exchange {
     }
 
     /// A publication to write to, with memory of an earlier one.
-    pub(crate) fn blank(&self) -> Box<Publication> {
+    pub(crate) fn blank(&self) -> Publication {
         self.lock().spare.take().unwrap_or_default()
     }
 
-    pub(crate) fn publish(&self, publication: Box<Publication>) {
+    pub(crate) fn publish(&self, publication: Publication) {
         let mut slots = self.lock();
         if let Some(unread) = slots.fresh.replace(publication) {
             slots.spare = Some(unread);
@@ -72,7 +72,7 @@ impl Exchange {
     pub(crate) fn meet(
         &self,
         pose: (DQuat, Point),
-        current: &mut Option<Box<Publication>>,
+        current: &mut Option<Publication>,
     ) -> bool {
         let mut slots = self.lock();
         slots.pose = Some(pose);
