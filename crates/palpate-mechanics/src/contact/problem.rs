@@ -301,7 +301,7 @@ impl Problem {
         let moved_len = coupling.moved_len();
         let to_frame = DMat3::IDENTITY;
         let nodes = (0..free.len() as u32).collect();
-        let part = BodyPart { coupling, nodes, to_frame, ..BodyPart::default() };
+        let part = BodyPart { nodes, coupling, to_frame, ..BodyPart::default() };
         Self { blocks, bodies: vec![part], moved_len }
     }
 }
