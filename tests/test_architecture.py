@@ -51,3 +51,22 @@ def test_unsafe_stays_out():
     for source in (ROOT / "crates").glob("*/src/**/*.rs"):
         code = re.sub(r"//.*", "", source.read_text())
         assert not re.search(r"\bunsafe\b", code) or source.name in UNSAFE, source
+
+
+def test_promises_are_held_where_the_page_says():
+    page = (ROOT / "ARCHITECTURE.md").read_text("utf-8")
+    rows = re.findall(r"^\| [^|]+ \| `([^`|]+)` \| ([^|]+) \|$", page, re.MULTILINE)
+    assert len(rows) > 20
+    for path, tests in rows:
+        code = (ROOT / path).read_text("utf-8")
+        names = re.findall(r"`(\w+)`", tests)
+        assert names, path
+        for name in names:
+            assert re.search(rf"\b(fn|def) {name}\b", code), f"{path}: {name}"
+
+
+def test_files_that_the_page_names_exist():
+    page = (ROOT / "ARCHITECTURE.md").read_text("utf-8")
+    for path in set(re.findall(r"`((?:palpate|python|tests)[\w./-]*/[\w./-]+)`", page)):
+        places = [ROOT / path, ROOT / "crates" / path]
+        assert any(each.exists() for each in places), path

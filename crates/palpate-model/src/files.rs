@@ -129,7 +129,7 @@ struct Format {
 }
 
 /// The formats that are known.
-const FORMATS: [Format; 2] = [seg::FORMAT, vtk::FORMAT];
+const FORMATS: &[Format] = &[seg::FORMAT, vtk::FORMAT];
 
 /// The extensions of the formats that are read and written here.
 pub const MESH_EXTENSIONS: [&str; FORMATS.len()] = {
@@ -145,7 +145,7 @@ pub const MESH_EXTENSIONS: [&str; FORMATS.len()] = {
 impl Format {
     fn of(path: &Path) -> Result<&'static Self, FileErrorCause> {
         let extension = path.extension().and_then(OsStr::to_str).unwrap_or_default();
-        let mut known = const { &FORMATS }.iter();
+        let mut known = FORMATS.iter();
         known
             .find(|format| extension.eq_ignore_ascii_case(format.extension))
             .ok_or_else(|| FileErrorCause::UnknownFormat(extension.to_owned()))

@@ -33,7 +33,7 @@ fn binary() -> Vec<u8> {
 
 fn try_all(bytes: &[u8]) -> usize {
     let mut built = 0;
-    for format in &FORMATS {
+    for format in FORMATS {
         let mut stream = bytes;
         let Ok(parsed) = (format.read)(&mut stream, bytes.len() as u64, None) else { continue };
         // A count that lies must not reserve more than the bytes could hold.

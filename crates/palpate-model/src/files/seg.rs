@@ -2,7 +2,6 @@
 
 use std::io::{self, Read, Write};
 use std::path::Path;
-use std::str::FromStr;
 
 use super::tokens::{ReadError, Style, Tokens, quoted, syntax};
 use super::{FileError, FileErrorCause, Format, ParseFailure, Parsed, write_atomically};
@@ -45,7 +44,7 @@ impl<R: Read> Parser<R> {
             }
             None => return syntax("the file is empty; expected `seg 1`"),
         }
-        let version: u32 = self.number("a version number", || "`seg`".into())?;
+        let version: u32 = self.tokens.number("a version number", || "`seg`".into())?;
         if version != 1 {
             return syntax(format!("version {version} of .seg is not known; this reads version 1"));
         }
@@ -82,23 +81,8 @@ impl<R: Read> Parser<R> {
         }
     }
 
-    fn number<T: FromStr>(
-        &mut self,
-        expected: &str,
-        whose: impl FnOnce() -> String,
-    ) -> Result<T, ReadError> {
-        let found = match self.tokens.next()? {
-            Some(word) => match word.parse() {
-                Ok(value) => return Ok(value),
-                Err(_) => quoted(word),
-            },
-            None => "the end of the file".to_owned(),
-        };
-        syntax(format!("{}: expected {expected}, found {found}", whose()))
-    }
-
     fn count(&mut self, section: &str) -> Result<usize, ReadError> {
-        self.number("how many follow", || format!("`{section}`"))
+        self.tokens.number("how many follow", || format!("`{section}`"))
     }
 
     fn nodes(&mut self) -> Result<(), ReadError> {
@@ -106,10 +90,10 @@ impl<R: Read> Parser<R> {
         self.data.nodes.reserve_exact(self.tokens.plausible(count, 6));
         for index in 0..count {
             let whose = || format!("node {index} of {count}");
-            let x = self.number("a coordinate", whose)?;
+            let x = self.tokens.number("a coordinate", whose)?;
             self.note_line(Place::Node(index));
-            let y = self.number("a coordinate", whose)?;
-            let z = self.number("a coordinate", whose)?;
+            let y = self.tokens.number("a coordinate", whose)?;
+            let z = self.tokens.number("a coordinate", whose)?;
             self.data.nodes.push([x, y, z]);
         }
         Ok(())
@@ -125,7 +109,8 @@ impl<R: Read> Parser<R> {
         for index in 0..count {
             let mut nodes = [0; N];
             for (corner, node) in nodes.iter_mut().enumerate() {
-                *node = self.number("a node index", || format!("{kind} {index} of {count}"))?;
+                *node =
+                    self.tokens.number("a node index", || format!("{kind} {index} of {count}"))?;
                 if corner == 0 {
                     self.note_line(Place::Element(kind, index));
                 }
@@ -151,7 +136,7 @@ impl<R: Read> Parser<R> {
         self.data.regions.reserve_exact(count);
         for index in 0..count {
             let whose = || format!("region of tetrahedron {index} of {count}");
-            let region = self.number("a whole number", whose)?;
+            let region = self.tokens.number("a whole number", whose)?;
             self.data.regions.push(region);
         }
         Ok(())
@@ -169,7 +154,7 @@ impl<R: Read> Parser<R> {
             let whose = || format!("fibre of tetrahedron {index} of {count}");
             let mut fibre = [0.0; 3];
             for component in &mut fibre {
-                *component = self.number("a component", whose)?;
+                *component = self.tokens.number("a component", whose)?;
             }
             self.data.fibres[family].push(fibre);
         }
@@ -187,7 +172,7 @@ impl<R: Read> Parser<R> {
         let mut nodes = Vec::with_capacity(self.tokens.plausible(count, 2));
         for index in 0..count {
             let whose = || format!("entry {index} of {count} of set `{name}`");
-            nodes.push(self.number("a node index", whose)?);
+            nodes.push(self.tokens.number("a node index", whose)?);
         }
         self.data.node_sets.insert(name, nodes);
         Ok(())

@@ -1,6 +1,7 @@
 //! Words of a mesh file, read through a small window.
 
 use std::io::{self, Read};
+use std::str::FromStr;
 
 /// Longer words mean that the file is no text at all.
 const LONGEST_WORD: usize = 4096;
@@ -184,6 +185,22 @@ impl<R: Read> Tokens<R> {
             Ok(word) => Ok(Some(word)),
             Err(_) => syntax("this is no text file: found bytes that are not UTF-8"),
         }
+    }
+
+    /// The next word as a number; `expected` and `whose` it is are for the error.
+    pub(super) fn number<T: FromStr>(
+        &mut self,
+        expected: &str,
+        whose: impl FnOnce() -> String,
+    ) -> Result<T, ReadError> {
+        let found = match self.next()? {
+            Some(word) => match word.parse() {
+                Ok(value) => return Ok(value),
+                Err(_) => quoted(word),
+            },
+            None => "the end of the file".to_owned(),
+        };
+        syntax(format!("{}: expected {expected}, found {found}", whose()))
     }
 
     /// The rest of the current line, without its end; `None` at the end of the file.

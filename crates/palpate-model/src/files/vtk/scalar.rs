@@ -1,7 +1,6 @@
 //! Numbers of a legacy `.vtk` file: words in ASCII, big-endian bytes in binary.
 
 use std::io::Read;
-use std::str::FromStr;
 
 use super::super::tokens::{ReadError, Tokens, quoted, syntax};
 
@@ -111,7 +110,7 @@ impl<R: Read> Values<R> {
         whose: impl FnOnce() -> String,
     ) -> Result<f64, ReadError> {
         if !self.binary {
-            return self.parse("a number", whose);
+            return self.tokens.number("a number", whose);
         }
         Ok(match scalar {
             Scalar::F32 => f32::from_be_bytes(self.tokens.bytes()?).into(),
@@ -127,7 +126,7 @@ impl<R: Read> Values<R> {
         whose: impl FnOnce() -> String,
     ) -> Result<i64, ReadError> {
         if !self.binary {
-            return self.parse("a whole number", whose);
+            return self.tokens.number("a whole number", whose);
         }
         Ok(match scalar {
             Scalar::I8 => i8::from_be_bytes(self.tokens.bytes()?).into(),
@@ -142,21 +141,6 @@ impl<R: Read> Values<R> {
                 return syntax(format!("{}: expected a whole-number data type", whose()));
             }
         })
-    }
-
-    fn parse<T: FromStr>(
-        &mut self,
-        expected: &str,
-        whose: impl FnOnce() -> String,
-    ) -> Result<T, ReadError> {
-        let found = match self.tokens.next()? {
-            Some(word) => match word.parse() {
-                Ok(value) => return Ok(value),
-                Err(_) => quoted(word),
-            },
-            None => "the end of the file".to_owned(),
-        };
-        syntax(format!("{}: expected {expected}, found {found}", whose()))
     }
 
     /// Skips `count` values.
