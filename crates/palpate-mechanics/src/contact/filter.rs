@@ -33,6 +33,9 @@ const LIP_COSINE: f64 = -0.3;
 const COINCIDENT: f64 = 1e-6;
 /// Time in which the contact distance is recovered where surfaces overlap [s].
 const RECOVERY_TIME: f64 = 0.05;
+/// The same where they are only closer than it, as a pair may be that has just begun to count because its
+/// direction changed: pushed apart at once it would cease to count, and the two would never rest.
+const GENTLE_RECOVERY_TIME: f64 = 0.5;
 
 /// Two contacts of a node are one when their directions and gaps (in contact distances) agree so well.
 const TWIN_COSINE: f64 = 0.9999;
@@ -379,6 +382,7 @@ fn candidate(
 ) -> Candidate {
     let (a, b) = (own.parameters, other.parameters);
     let distance = a.distance(b);
+    let recovery_time = if gap < 0.0 { RECOVERY_TIME } else { GENTLE_RECOVERY_TIME };
     // Both surfaces of a soft pair bring contacts to the same patch.
     let share = if a.rigid || b.rigid { 1.0 } else { 0.5 };
     Candidate {
@@ -391,7 +395,7 @@ fn candidate(
         offset: 0.0,
         distance,
         stiffness: share * area * a.stiffness(b),
-        recovery: gap + distance * time_step / RECOVERY_TIME,
+        recovery: gap + distance * time_step / recovery_time,
         friction: a.friction(b),
         tied: None,
     }

@@ -304,6 +304,8 @@ impl ElasticBody {
             if after >= -OVERSHOT * before {
                 return;
             }
+            // A says too little about this shape.
+            method.effort = method.effort.max(SLOW);
             // Where the residual along the move vanishes if it changes in proportion.
             let part = (before / (before - after)).max(SHORTEST);
             for (d, s) in self.step.correction.iter_mut().zip(&mut method.pairs[known].s) {
