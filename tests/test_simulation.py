@@ -1,5 +1,7 @@
 """Simulation from Python: stepping, state, bits, physics that can be computed by hand."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -306,3 +308,19 @@ def test_a_step_that_fails_names_where_and_why_and_changes_nothing(make_box):
         assert error.node in simulation.model.bodies[0].mesh.tetrahedra[error.tetrahedron]
         assert [simulation.positions[0].tobytes(), simulation.velocities[0].tobytes()] == before
         assert simulation.time == 1 / 60
+
+
+@pytest.mark.parametrize("friction", [0.1, 0.4])
+def test_organs_in_a_pile_come_to_rest(friction):
+    # Each setting ends in another pile, with other contacts on the verge of coming and going.
+    model = palpate.read_model("case1")
+    for body in model.bodies:
+        assert body.rigid is not None or body.material.law == "neo-hookean"
+    bodies = [
+        replace(body, contact=replace(body.contact, friction=friction)) for body in model.bodies
+    ]
+    simulation = palpate.Simulation(palpate.Model(bodies, gravity=model.gravity))
+    report = simulation.step(200)
+    assert report.contacts > 100
+    fastest = max(np.linalg.norm(velocities, axis=1).max() for velocities in simulation.velocities)
+    assert fastest < 1e-4
