@@ -181,6 +181,17 @@ def test_creases_are_sharp_and_the_rest_is_smooth(page, make_box):
     assert len(origin) == len(ball.surface_nodes)
 
 
+def test_it_says_when_it_falls_behind_real_time(page):
+    chips = "document.getElementById('chips')"
+    page.run("palpate.send({ type: 'speed', value: 1 }), palpate.send({ type: 'play', on: true })")
+    page.wait(f"/real time$/.test({chips}.textContent)")
+    # Thousands of times real time: no machine keeps up with that.
+    page.run("palpate.send({ type: 'speed', value: 1000 })")
+    page.wait(f"{chips}.querySelector('.warn')?.textContent.endsWith('behind')")
+    assert "cannot keep up" in page.run(f"{chips}.querySelector('.warn').title")
+    page.run("palpate.send({ type: 'speed', value: 1 })")
+
+
 def test_the_camera_turns_with_the_mouse(page):
     page.run("palpate.setMode('look')")
     page.run("globalThis.before = palpate.stage.camera.position.clone()")

@@ -119,7 +119,7 @@ export class Overlay {
     let to = 0;
     let box = 0;
     this.stage.bodies.forEach((body, i) => {
-      const color = body.tint.multiplyScalar(body.look.rigid ? 0.6 : 0.35).toArray();
+      const color = body.tint.multiplyScalar(body.look.rigid ? 0.6 : 0.5).toArray();
       for (const end = box + counts[i]; box < end; box++) {
         if (!body.visible) continue;
         for (let at = to; at < to + 3 * EDGES.length; at += 3) colors.set(color, at);
