@@ -60,11 +60,8 @@ class ModelError(PalpateError, ValueError):
 class SimulationError(PalpateError, RuntimeError):
     """A simulation that cannot start or go on; the state is that before the failed step.
 
-    Attributes
-    ----------
-    body, node, tetrahedron : int or None
-        Where a step failed: index of the body, node that is to blame or else the first that is
-        lost, first tetrahedron of the node (None of a rigid body).
+    Where a step failed stands in ``body`` (its index), ``node`` (that is to blame, or else the
+    first that is lost) and ``tetrahedron`` (the node's first; None of a rigid body), else None.
     """
 
     def __init__(
