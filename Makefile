@@ -84,7 +84,7 @@ $(VENV)/.docs: $(VENV)/.installed
 	@touch $@
 
 wheel: $(BIN)/maturin ## Build a wheel for any Python from 3.10 on, and try it in an empty environment
-	$(BIN)/maturin build --release --locked --strip --out dist
+	$(BIN)/maturin build --release --locked --strip --out dist $(ARGS)
 	$(PYTHON) tests/try_wheel.py dist
 
 crates: ## Pack the Rust crates as they would be published, and build them from that

@@ -70,3 +70,17 @@ def test_files_that_the_page_names_exist():
     for path in set(re.findall(r"`((?:palpate|python|tests)[\w./-]*/[\w./-]+)`", page)):
         places = [ROOT / path, ROOT / "crates" / path]
         assert any(each.exists() for each in places), path
+
+
+def test_one_version_everywhere():
+    workspace = (ROOT / "Cargo.toml").read_text("utf-8")
+    version = re.search(r'^version = "([^"]+)"$', workspace, re.MULTILINE)[1]
+    ours = re.findall(
+        r'^palpate[\w-]* = \{ path = "[^"]+", version = "([^"]+)" \}$', workspace, re.M
+    )
+    assert set(ours) == {version}
+    assert f"\nversion: {version}\n" in (ROOT / "CITATION.cff").read_text("utf-8")
+    assert f"\n## [{version}] - 20" in (ROOT / "CHANGELOG.md").read_text("utf-8")
+    rust = re.search(r'^rust-version = "([^"]+)"$', workspace, re.MULTILINE)[1]
+    for page in ("README.md", "CONTRIBUTING.md", "docs/installation.md", ".ci/run"):
+        assert re.search(rf"\b{re.escape(rust)}\b", (ROOT / page).read_text("utf-8")), page
