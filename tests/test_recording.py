@@ -197,6 +197,14 @@ def test_a_film_of_a_model(tmp_path):
     assert len(messages_of(path.read_text())) == 2 + 4
 
 
+def test_a_mesh_alone_floats(tmp_path):
+    film, mesh = tmp_path / "film.html", palpate.model.MODELS / "small.seg"
+    run("view", mesh, "--export", film, "--duration", 0.1)
+    _, _, first, *others = messages_of(film.read_text())
+    assert first[1]["positions"].any()
+    assert not any(arrays["positions"].any() for _, arrays in others)  # they tell the motion
+
+
 def test_render_draws_models_and_runs(finished, tmp_path):
     still, strip, film = (tmp_path / name for name in ("a.png", "b.png", "c.gif"))
     run("render", "small", "-o", still, "--width", 200)

@@ -9,8 +9,9 @@ from typing import Annotated
 
 import typer
 
-from palpate.cli.opening import open_model
+from palpate.cli.opening import is_mesh, open_model
 from palpate.cli.output import LeafSizeOption, ThreadsOption, console, parse_seconds
+from palpate.model import Model
 from palpate.simulation import Simulation
 
 
@@ -59,7 +60,8 @@ def command(
 ) -> None:
     """Show a model in the browser: play it, pull at it, change it; or play a recorded run.
 
-    The page needs nothing from the internet, and neither does an exported film. Ctrl-C ends it.
+    The page needs nothing from the internet, and neither does an exported film. A mesh alone floats
+    without gravity. Ctrl-C ends it.
 
     Example: palpate view case2
 
@@ -82,6 +84,8 @@ def command(
         if path.suffix == ".palpate":
             return LivePlayer(Simulation.load(target, threads=threads))
         model, _, _ = open_model(target)
+        if is_mesh(target):  # nothing is there that it could fall on
+            model = Model(model.bodies, gravity=(0.0, 0.0, 0.0))
         return LivePlayer(
             Simulation(model, time_step=time_step, threads=threads, leaf_size=leaf_size)
         )
