@@ -32,7 +32,7 @@ loop = simulation.tool("probe").loop()
 done = threading.Event()
 
 
-def take_steps():
+def take_steps() -> None:
     while not done.is_set():
         began = time.perf_counter()
         simulation.step()  # moves the tool to the pose of the newest tick
