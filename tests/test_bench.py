@@ -339,7 +339,7 @@ def test_the_machine_is_named_without_its_host():
 
 
 def test_realtime_measures_each_law_and_situation(tmp_path):
-    few = ("--landing", 6, "--rest", 2, "--pulled", 3)
+    few = ("--landing", 6, "--rest", 2, "--pulled", 3, "--loop", 0.3)
     laws = ("--law", "linear", "--law", "as written")
     run("bench", "realtime", "small", *laws, "--threads", 1, *few, "-o", tmp_path)
     results = json.loads((tmp_path / "results.json").read_text())
@@ -353,7 +353,14 @@ def test_realtime_measures_each_law_and_situation(tmp_path):
         assert each["inverted"] == 0
         assert 0 < each["factor_bytes"] < each["peak_memory"]
         assert each["floor"] > 0
+        loop = each["loop"]
+        assert 0 < loop["median"] <= loop["p99"] <= loop["worst"]
+        assert loop["ticks"] > 20
+        assert loop["steps"] > 0
+        assert loop["contacts"] > 0
+        assert loop["force"] > 0
     assert len(rows(tmp_path / "realtime.csv")) == 6
+    assert "Tool loop" in (tmp_path / "report.md").read_text()
     assert "| small |" in (tmp_path / "report.md").read_text()
 
 

@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from palpate.bench import tool_loop
 from palpate.bench.output import (
     markdown_table,
     milliseconds,
@@ -74,6 +75,8 @@ class Outcome:
     deepest_at_end: float
     mean_edge: float
     speed_at_end: float
+    #: A tool's loop at 1 kHz while the pile is stepped; None if it was not measured.
+    loop: tool_loop.LoopOutcome | None = None
 
 
 def with_law(model: Model, law: str) -> Model:
@@ -200,17 +203,26 @@ def run(
     laws: Sequence[str],
     threads: Sequence[int],
     frames: Sequence[int] = (LANDING, REST, PULLED),
+    loop: float = 0.0,
     advance: Callable[[], None] = lambda: None,
 ) -> list[Outcome]:
-    """Measure every model (name, path, divisions) in processes of their own; write the report."""
+    """Measure every model (name, path, divisions) in processes of their own; write the report.
+
+    ``loop``: seconds for which a tool's loop is measured, at 1 kHz of real time; 0 for none.
+    """
     outcomes = []
     for name, path, divisions in models:
         for law in laws:
             for count in threads:
-                outcomes.append(_in_process(name, path, divisions, law, count, frames))
+                outcomes.append(_in_process(name, path, divisions, law, count, frames, loop))
                 advance()
     folder.mkdir(parents=True, exist_ok=True)
-    options = {"laws": list(laws), "threads": list(threads), "frames": list(frames)}
+    options = {
+        "laws": list(laws),
+        "threads": list(threads),
+        "frames": list(frames),
+        "loop": loop,
+    }
     write_json(
         folder / "results.json",
         "bench realtime",
@@ -223,9 +235,15 @@ def run(
 
 
 def _in_process(
-    name: str, path: str, divisions: int, law: str, threads: int, frames: Sequence[int]
+    name: str,
+    path: str,
+    divisions: int,
+    law: str,
+    threads: int,
+    frames: Sequence[int],
+    loop: float,
 ) -> Outcome:
-    task = json.dumps([name, path, divisions, law, threads, list(frames)])
+    task = json.dumps([name, path, divisions, law, threads, list(frames), loop])
     command = [sys.executable, "-m", "palpate.bench.realtime", task]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode:
@@ -233,6 +251,8 @@ def _in_process(
         raise RuntimeError(f"{name}, {law}, {threads} threads: {last[0]}")
     values = json.loads(done.stdout)
     values["situations"] = [Situation(**each) for each in values["situations"]]
+    if values["loop"] is not None:
+        values["loop"] = tool_loop.LoopOutcome(**values["loop"])
     return Outcome(**values)
 
 
@@ -242,7 +262,8 @@ def rate(seconds: float) -> str:
 
 
 def _flat(outcome: Outcome) -> list[dict[str, Any]]:
-    own = {key: value for key, value in asdict(outcome).items() if key != "situations"}
+    left_out = ("situations", "loop")
+    own = {key: value for key, value in asdict(outcome).items() if key not in left_out}
     return [
         {**own, **{key: value for key, value in asdict(each).items() if key != "stages"}}
         | {f"stage_{stage}": seconds for stage, seconds in each.stages.items()}
@@ -309,6 +330,41 @@ def _report(outcomes: Sequence[Outcome]) -> list[str]:
             for situation in each.situations
         ],
     )
+    loops = markdown_table(
+        "model<|law<|threads|ticks/s|median ms|99 % ms|worst ms|late 99 % ms|steps/s|step ms"
+        "|contacts|force N|jump 99 % N",
+        [
+            (
+                each.model,
+                each.law,
+                each.threads,
+                whole(round(each.loop.ticks / each.loop.seconds)),
+                *(
+                    milliseconds(seconds)
+                    for seconds in (
+                        each.loop.median,
+                        each.loop.p99,
+                        each.loop.worst,
+                        each.loop.late,
+                    )
+                ),
+                whole(round(each.loop.steps / each.loop.seconds)),
+                milliseconds(each.loop.step_median),
+                f"{each.loop.contacts:.1f}",
+                f"{each.loop.force:.3f}",
+                f"{each.loop.jump:.3f}",
+            )
+            for each in outcomes
+            if each.loop is not None
+        ],
+    )
+    loop_part = [
+        "Tool loop: a ball of 16 mm presses on the last body and rubs it, 1,000 ticks a second "
+        "being asked for, while another thread takes 60 steps a second. Time of a tick as its "
+        "caller sees it, how late ticks began, steps meanwhile, mean force and its change from "
+        "tick to tick:",
+        loops,
+    ]
     return [
         "# Real time",
         "A frame is 1/60 s of simulated time: detection, contact, friction and the state after it. "
@@ -316,6 +372,7 @@ def _report(outcomes: Sequence[Outcome]) -> list[str]:
         "does: no frame can be faster than that.",
         frames,
         bodies,
+        *(loop_part if any(each.loop is not None for each in outcomes) else []),
         "Mean time of a frame by stage [ms]:",
         stages,
     ]
@@ -323,11 +380,15 @@ def _report(outcomes: Sequence[Outcome]) -> list[str]:
 
 def main() -> None:
     """Measure what the only argument says, and print it."""
-    name, path, divisions, law, threads, frames = json.loads(sys.argv[1])
+    name, path, divisions, law, threads, frames, loop = json.loads(sys.argv[1])
     model = read_model(path)
     if divisions > 1:
         model = refined(model, divisions)
-    print(json.dumps(asdict(measure(name, model, law, threads, frames))))
+    outcome = measure(name, model, law, threads, frames)
+    if loop:
+        felt = tool_loop.measure(with_law(model, law), threads, loop)
+        outcome = replace(outcome, loop=felt)
+    print(json.dumps(asdict(outcome)))
 
 
 if __name__ == "__main__":

@@ -281,10 +281,15 @@ def bench_realtime(
     pulled: Annotated[int, typer.Option(min=0, help="Frames with a body pulled about.")] = (
         realtime.PULLED
     ),
+    loop: Annotated[
+        float, typer.Option(min=0, help="Seconds of a tool's loop at 1 kHz; 0 for none.")
+    ] = 4.0,
     output: Annotated[Path, _output_option("realtime")] = Path("out/bench/realtime"),
     json_output: JsonOption = False,
 ) -> None:
     """Measure whole frames of 1/60 s: bodies that land, that rest, and one that is pulled about.
+
+    Then a tool's loop at 1 kHz that feels the pile while it is stepped in real time.
 
     Every run is a process of its own. Writes results.json, realtime.csv and report.md.
 
@@ -305,6 +310,7 @@ def bench_realtime(
             laws=laws,
             threads=counts,
             frames=(landing, rest, pulled),
+            loop=loop,
             advance=advance,
         )
     if json_output:
