@@ -246,7 +246,7 @@ class Tool:
         ----------
         margin : float
             Tissue within this distance [m] of the tool gives way, beside what it can reach until
-            the next step; 1.5 mean edges of the tissue's surface unless given.
+            the next step; a mean edge of the tissue's surface unless given.
 
         Notes
         -----

@@ -74,6 +74,9 @@ def measure(model: Model, threads: int, seconds: float) -> LoopOutcome:
     simulation.step(_LANDING)
     positions = simulation.positions[soft[-1]]
     top = positions[positions[:, 2].argmax()]
+    upright = np.eye(3)
+    simulation.tool("tool").set_pose(upright, top - above + [0.0, 0.0, _RADIUS + _DEPTH])
+    simulation.step(2)
     loop = simulation.tool("tool").loop()
     done = threading.Event()
     steps: list[float] = []
@@ -89,7 +92,6 @@ def measure(model: Model, threads: int, seconds: float) -> LoopOutcome:
     late: list[float] = []
     forces: list[npt.NDArray[np.float64]] = []
     contacts = 0
-    upright = np.eye(3)
     solver = threading.Thread(target=take_steps)
     solver.start()
     try:

@@ -2,17 +2,22 @@
 
 use std::sync::{Arc, Weak};
 
-use palpate_contact::PairKind;
+use glam::DVec3;
+use palpate_geometry::Point;
 use palpate_mechanics::PatchMemory;
 
-use super::{CONTACT_PAIRS, Simulation, SimulationError};
+use super::{Simulation, SimulationError};
 use crate::tool_loop::ToolLoop;
 use crate::tool_loop::exchange::{Exchange, Organ, Publication};
 
 /// How far ahead of a tool tissue gives way, in mean edges of its surface, beside how far the tool moves.
-const MARGIN: f64 = 1.5;
-/// How far a tool may move before the next publication, in times of its last step.
+const MARGIN: f64 = 1.0;
+/// How far around that its nodes are, in mean edges.
+const AROUND: f64 = 1.5;
+/// How far a tool may move before the next publication, in times of its last step; at most so many mean
+/// edges, since it must not move farther in a step.
 const STEPS_AHEAD: f64 = 2.0;
+const MOST_AHEAD: f64 = 3.0;
 /// Most nodes of a body that give way to a tool, those nearest to it.
 const MOST_NODES: usize = 96;
 
@@ -27,6 +32,7 @@ pub(super) struct Link {
     /// Distance and node of what is close to the tool, and the nodes that are chosen.
     close: Vec<(f64, u32)>,
     nodes: Vec<u32>,
+    points: Vec<Point>,
 }
 
 impl Simulation {
@@ -35,7 +41,7 @@ impl Simulation {
     /// was made before gets no news.
     ///
     /// `margin` [m]: tissue within that distance of the tool gives way, beside that which it can reach until the
-    /// next step; 1.5 mean edges of the body unless given.
+    /// next step; a mean edge of the body unless given.
     ///
     /// # Errors
     /// If the body does not exist or is not rigid, or the margin is not a positive number.
@@ -60,6 +66,7 @@ impl Simulation {
             edges: Vec::new(),
             close: Vec::new(),
             nodes: Vec::new(),
+            points: Vec::new(),
         });
         self.publish()?;
         Ok(result)
@@ -88,18 +95,19 @@ impl Simulation {
         }
         self.scene()?;
         let mut loops = std::mem::take(&mut self.loops);
+        let mut written = Ok(());
         for link in &mut loops {
             if let Some(exchange) = link.exchange.upgrade() {
                 let mut publication = exchange.blank();
-                self.write(link, &mut publication);
+                written = written.and(self.write(link, &mut publication));
                 exchange.publish(publication);
             }
         }
         self.loops = loops;
-        Ok(())
+        written
     }
 
-    fn write(&mut self, link: &mut Link, to: &mut Publication) {
+    fn write(&mut self, link: &mut Link, to: &mut Publication) -> Result<(), SimulationError> {
         let tool = link.tool;
         to.model = Some(Arc::clone(&self.model));
         to.step = self.dynamics.step_count();
@@ -109,7 +117,7 @@ impl Simulation {
         let touching = self.dynamics.contacts().iter();
         to.contacts.extend(touching.filter(|contact| contact.bodies.contains(&(tool as u32))));
         let speeds = self.dynamics.velocities(tool).iter();
-        let fastest = speeds.map(|&v| glam::DVec3::from_array(v).length()).fold(0.0, f64::max);
+        let fastest = speeds.map(|&v| DVec3::from_array(v).length()).fold(0.0, f64::max);
         let ahead = STEPS_AHEAD * fastest * self.options.time_step;
 
         let model = Arc::clone(&self.model);
@@ -122,9 +130,9 @@ impl Simulation {
         for (organ, body) in to.organs.iter_mut().zip(soft) {
             organ.body = body;
             let edge = link.edges[body];
-            // Far away it may be from one step to the next, but not farther than it is long.
-            let margin = link.margin.unwrap_or(MARGIN * edge) + ahead.min(10.0 * edge);
-            self.find_close(tool, body, margin, link);
+            let margin = link.margin.unwrap_or(MARGIN * edge);
+            let reach = margin + ahead.min(MOST_AHEAD * edge) + AROUND * edge;
+            self.find_close(tool, body, reach, link)?;
             organ.is_near = !link.close.is_empty();
             if organ.is_near {
                 organ.positions.clear();
@@ -133,32 +141,44 @@ impl Simulation {
                 self.dynamics.write_patch(body, &link.nodes, memory, &mut organ.patch);
             }
         }
+        Ok(())
     }
 
-    /// Finds the nodes of a body within `margin` of a tool, at most so many.
-    fn find_close(&mut self, tool: usize, body: usize, margin: f64, link: &mut Link) {
-        let distance =
-            |a: usize, b: usize| ((a, b) == (tool.min(body), tool.max(body))).then_some(margin);
-        let found = self.scene.proximity_with(&distance, &CONTACT_PAIRS);
-        let Link { close, nodes, .. } = link;
-        close.clear();
-        for pair in &found.pairs {
-            for (corner, &node) in pair.nodes.iter().enumerate() {
-                let side = match pair.kind {
-                    PairKind::VertexTriangle => usize::from(corner > 0),
-                    PairKind::EdgeEdge => usize::from(corner > 1),
-                };
-                if pair.bodies[side] as usize == body {
-                    close.push((pair.distance, node));
-                }
+    /// Finds the nodes of a body within `reach` [m] of a tool, at most so many.
+    fn find_close(
+        &mut self,
+        tool: usize,
+        body: usize,
+        reach: f64,
+        link: &mut Link,
+    ) -> Result<(), SimulationError> {
+        let Link { points, close, nodes, .. } = link;
+        let corners = self.dynamics.positions(tool).iter().map(|&x| DVec3::from_array(x));
+        let (low, high) = corners.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), x| {
+            (low.min(x), high.max(x))
+        });
+        let (low, high) = (low - reach, high + reach);
+        let positions = self.dynamics.positions(body);
+        nodes.clear();
+        points.clear();
+        for &node in self.model.bodies[body].mesh.surface_nodes() {
+            let x = DVec3::from_array(positions[node as usize]);
+            if x.cmpge(low).all() && x.cmple(high).all() {
+                nodes.push(node);
+                points.push(positions[node as usize]);
             }
         }
-        close.sort_unstable_by(|a, b| a.1.cmp(&b.1).then(a.0.total_cmp(&b.0)));
-        close.dedup_by_key(|entry| entry.1);
+        close.clear();
+        if !points.is_empty() {
+            let found = self.scene.closest(points, Some(tool), reach)?;
+            let within = found.iter().zip(&*nodes);
+            close.extend(within.filter_map(|(at, &node)| Some((at.as_ref()?.distance, node))));
+        }
         close.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         close.truncate(MOST_NODES);
         nodes.clear();
         nodes.extend(close.iter().map(|&(_, node)| node));
         nodes.sort_unstable();
+        Ok(())
     }
 }
