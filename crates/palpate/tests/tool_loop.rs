@@ -150,10 +150,14 @@ fn twice_as_deep_is_twice_the_force_and_nothing_is_nothing() {
     }
     // At rest, from where it begins to push in earnest; and between two steps.
     let depths = [0.0, 1e-3, 2e-3];
-    let at_rest =
-        depths.map(|depth| follow(&mut simulation, &mut tool, 60, |_| down(depth)).force[2]);
+    let mut place = -2e-3;
+    let at_rest = depths.map(|depth| {
+        let from = std::mem::replace(&mut place, depth);
+        follow(&mut simulation, &mut tool, 60, |s| down(from + s * (depth - from)));
+        follow(&mut simulation, &mut tool, 120, |_| down(depth)).force[2]
+    });
     let between = depths.map(|depth| {
-        let ticks = (0..=20).map(|tick| 2e-3 + depth * f64::from(tick) / 20.0);
+        let ticks = (0..=100).map(|tick| 2e-3 + depth * (f64::from(tick) / 50.0).min(1.0));
         ticks.map(|depth| feel(&mut tool, down(depth)).force[2]).last().unwrap()
     });
     for [first, second, third] in [at_rest, between] {
