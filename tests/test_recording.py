@@ -14,7 +14,7 @@ import palpate
 from palpate.cli import app
 from palpate.results.reading import RecordingError, read_frame, read_report, read_series
 from palpate.results.vtu import Grid
-from palpate.viewer import NullViewer
+from palpate.viewer import NullViewer, recorded
 from palpate.viewer.protocol import decode
 from palpate.viewer.recorded import RecordedPlayer, Recording, boundary
 from palpate.viewer.surface import Surfaces
@@ -195,6 +195,17 @@ def test_a_film_of_a_model(tmp_path):
     path = tmp_path / "film.html"
     assert "4 frames" in run("view", "small", "--export", path, "--duration", 0.05)
     assert len(messages_of(path.read_text())) == 2 + 4
+
+
+def test_runs_that_know_no_stress_are_played(finished, tmp_path, monkeypatch):
+    monkeypatch.setattr(recorded, "_STRESS", "of old runs")
+    viewer = NullViewer(lambda: RecordedPlayer(Recording(finished)))
+    assert "stress" not in viewer.header("hello")["fields"]
+    viewer.send({"type": "show", "field": "stress", "contacts": False, "touching": False})
+    assert list(viewer.arrays("frame")) == ["positions"]
+    run("view", finished, "--export", tmp_path / "film.html")
+    (hello, _), *_ = messages_of((tmp_path / "film.html").read_text())
+    assert hello["fields"] == ["displacement", "depth", "force"]
 
 
 def test_a_mesh_alone_floats(tmp_path):
