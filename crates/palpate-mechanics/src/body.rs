@@ -54,7 +54,7 @@ pub(crate) struct Motion {
     pub(crate) mean: DVec3,
     /// Largest deviation of a displacement from the mean [m].
     pub(crate) spread: f64,
-    /// Largest displacement relative to the rigid part of the motion [m].
+    /// How much closer two nodes come to each other by the deformation, at most [m].
     pub(crate) deformation: f64,
 }
 
@@ -167,8 +167,13 @@ impl MovingBody {
         let mean = surface.iter().map(displacement).sum::<DVec3>() / surface.len().max(1) as f64;
         let spread = surface.iter().map(|node| (displacement(node) - mean).length());
         let deformation = self.elastic().map_or(0.0, |elastic| {
-            let speeds = surface.iter().map(|&node| elastic.deformation_speed(node));
-            time_step * speeds.fold(0.0, f64::max)
+            let (mut fastest, mut low, mut high) = (0.0_f64, DVec3::MAX, DVec3::MIN);
+            for velocity in surface.iter().map(|&node| elastic.deformation(node)) {
+                fastest = fastest.max(velocity.length());
+                (low, high) = (low.min(velocity), high.max(velocity));
+            }
+            // Where one patch moves and the rest does not, the box of the velocities is the tighter bound.
+            time_step * (2.0 * fastest).min((high - low).length())
         });
         Motion { mean, spread: spread.fold(0.0, f64::max), deformation }
     }

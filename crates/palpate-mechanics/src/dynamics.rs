@@ -32,7 +32,7 @@ pub use failure::{Cause, Failure};
 /// Motion margin of a search, in mean edges of the finer deformable surface: contacts farther
 /// ahead are found in a later step, or as penetrations.
 const MARGIN_LIMIT: f64 = 3.0;
-/// The same within one body. The bound on its deformation is loose (the two fastest nodes, wherever
+/// The same within one body. The bound on its deformation is loose (the two nodes that differ most, wherever
 /// they are), and the pairs found grow with the square of the distance: at 3 edges they cost more than
 /// the whole step, at 1.5 a quarter of that.
 const SELF_MARGIN_LIMIT: f64 = 1.5;
@@ -303,7 +303,7 @@ impl Dynamics {
         }
         let (first, second) = (self.body(body_a).motion, self.body(body_b).motion);
         let (margin, limit) = if body_a == body_b {
-            (2.0 * (first.deformation + self.ties.moved(body_a)), SELF_MARGIN_LIMIT)
+            (first.deformation + self.ties.drawn(body_a), SELF_MARGIN_LIMIT)
         } else {
             let pulled = self.ties.moved(body_a) + self.ties.moved(body_b);
             let apart = (first.mean - second.mean).length();

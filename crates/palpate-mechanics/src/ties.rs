@@ -129,6 +129,15 @@ impl Ties {
         pulls.map(|pull| pull.moved).fold(0.0, f64::max)
     }
 
+    /// How much closer to each other two nodes of a body are pulled by that, at most [m].
+    pub(crate) fn drawn(&self, body: usize) -> f64 {
+        let pulls = self.pulls.iter().filter(|pull| pull.body as usize == body);
+        let two = pulls.fold([0.0_f64; 2], |[first, second], pull| {
+            [first.max(pull.moved), second.max(first.min(pull.moved))]
+        });
+        two.iter().sum()
+    }
+
     /// Adds all ties to the candidates of a step, the springs first; `place` gives the position of a node and the
     /// contact distance of its body. Springs' ends go a `part` of their way from where they were.
     pub(crate) fn add_candidates(

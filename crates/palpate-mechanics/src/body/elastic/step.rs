@@ -213,9 +213,9 @@ impl ElasticBody {
         }
     }
 
-    /// Speed of the deformation at a node [m/s].
-    pub(in crate::body) fn deformation_speed(&self, node: u32) -> f64 {
-        self.step.deformation[node as usize].length()
+    /// Velocity of the deformation at a node, in the frame [m/s].
+    pub(in crate::body) fn deformation(&self, node: u32) -> DVec3 {
+        self.step.deformation[node as usize]
     }
 
     /// Finds out how contact forces turn the body, if it is not attached and that is not known.
