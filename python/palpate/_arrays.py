@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Iterable
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -10,12 +11,16 @@ import numpy.typing as npt
 Float64Array = npt.NDArray[np.float64]
 IndexArray = npt.NDArray[np.int32]
 
+_T = TypeVar("_T")
+
 
 def _as_array(value: Any, name: str, expected: str) -> npt.NDArray[Any]:
     try:
         array = np.asarray(value)
-    except ValueError as error:  # ragged nested sequences
-        raise ValueError(f"{name}: expected {expected}, got a ragged sequence ({error})") from None
+    except ValueError:
+        raise ValueError(
+            f"{name}: expected {expected}, got a ragged sequence: give rows of the same length"
+        ) from None
     if array.dtype == object:
         raise TypeError(f"{name}: expected {expected}, got an array of Python objects")
     return array
@@ -71,6 +76,34 @@ def scalar(value: Any, name: str, *, minimum: float | None = None) -> float:
         bound = "a finite number" if minimum is None else f"a finite number, at least {minimum}"
         raise ValueError(f"{name}: expected {bound}, got {number}")
     return number
+
+
+def number(value: Any, name: str) -> float:
+    """``value`` as a float; the core says which are allowed."""
+    if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, float, np.number)):
+        raise TypeError(f"{name}: expected a number, got {type(value).__name__}")
+    try:
+        return float(value)  # type: ignore[arg-type]
+    except (OverflowError, TypeError):
+        raise ValueError(f"{name}: expected a number that a float can hold, got {value}") from None
+
+
+def instance(value: Any, name: str, kind: type[_T]) -> _T:
+    """``value`` if it is one of a class."""
+    if isinstance(value, kind):
+        return value
+    article = "an" if kind.__name__[0] in "AEIOU" else "a"
+    where = "palpate." if kind.__module__.startswith("palpate.") else ""
+    raise TypeError(
+        f"{name}: expected {article} {where}{kind.__name__}, got {type(value).__name__}"
+    )
+
+
+def sequence(value: Any, name: str, expected: str) -> list[Any]:
+    """``value`` as a list."""
+    if isinstance(value, (str, bytes)) or not isinstance(value, Iterable):
+        raise TypeError(f"{name}: expected {expected}, got {type(value).__name__}")
+    return list(value)
 
 
 def count(value: Any, name: str, *, minimum: int = 1) -> int:

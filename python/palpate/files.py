@@ -14,6 +14,7 @@ import numpy as np
 from palpate import _core
 from palpate.errors import MeshError
 from palpate.mesh import Mesh
+from palpate.results.atomic import naming
 
 #: Extensions that the core reads and writes itself.
 CORE_FORMATS = tuple(f".{each}" for each in _core.MESH_EXTENSIONS)
@@ -81,10 +82,22 @@ def _meshio(path: Path) -> Any:
     return meshio
 
 
+def _check_extension(known: Any, path: Path) -> None:
+    if not any(path.name.lower().endswith(suffix) for suffix in known):
+        raise MeshError(
+            f"{path}: {path.suffix or 'a name without extension'} is no mesh format known here; "
+            "use .seg, .vtk or one of meshio's, such as .msh, .vtu, .stl",
+            str(path),
+        )
+
+
 def _read_with_meshio(path: Path, repair: bool) -> Mesh:
     if not path.exists():
-        raise FileNotFoundError(2, "No such file", str(path))
+        raise FileNotFoundError(2, "No such file or directory", str(path))
+    if path.is_dir():
+        raise IsADirectoryError(21, "Is a directory", str(path))
     meshio = _meshio(path)
+    _check_extension(meshio.extension_to_filetypes, path)
     try:
         with warnings.catch_warnings():  # numpy's, about meshio's own arithmetic
             warnings.simplefilter("ignore")
@@ -221,6 +234,7 @@ def _drop_unused(points: Any, elements: Any) -> tuple[Any, Any, int, Any]:
 
 def _write_with_meshio(path: Path, mesh: Mesh) -> None:
     meshio = _meshio(path)
+    _check_extension(meshio.extension_to_filetypes, path)
     solid = len(mesh.tetrahedra) > 0
     cells = [("tetra", mesh.tetrahedra)] if solid else [("triangle", mesh.triangles)]
     if path.suffix.lower() in (".stl", ".obj", ".ply", ".off"):
@@ -235,13 +249,15 @@ def _write_with_meshio(path: Path, mesh: Mesh) -> None:
     raw = meshio.Mesh(mesh.nodes, cells, cell_data=cell_data)
     # Written next to its place and renamed, so that the file is complete or absent; some formats
     # (TetGen) are several files, which all move.
-    with tempfile.TemporaryDirectory(dir=path.parent, prefix=".palpate-") as folder:
+    with naming(path), tempfile.TemporaryDirectory(dir=path.parent, prefix=".palpate-") as folder:
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")
                 meshio.write(Path(folder) / path.name, raw, _WRITE_AS.get(path.suffix.lower()))
         except SystemExit:
             raise MeshError(f"{path}: meshio cannot write this format", str(path)) from None
+        except OSError:
+            raise
         except Exception as error:
             raise MeshError(f"{path}: meshio cannot write it: {error}", str(path)) from error
         for part in sorted(Path(folder).iterdir()):

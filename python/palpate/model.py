@@ -48,17 +48,20 @@ class Material:
     fibre_2: tuple[float, float, float] | None = None
 
     def _row(self, name: str) -> _core._Material:
+        def number(value: Any, what: str) -> float:
+            return _arrays.number(value, f"{name}: {what}")
+
         return (
-            self.law,
-            self.young,
-            self.poisson,
-            self.density,
-            self.damping,
-            self.mass_damping,
-            self.mooney,
-            self.k1,
-            self.k2,
-            self.kappa,
+            _arrays.instance(self.law, f"{name}: law", str),
+            number(self.young, "young"),
+            number(self.poisson, "poisson"),
+            number(self.density, "density"),
+            number(self.damping, "damping"),
+            number(self.mass_damping, "mass_damping"),
+            number(self.mooney, "mooney"),
+            number(self.k1, "k1"),
+            number(self.k2, "k2"),
+            number(self.kappa, "kappa"),
             None if self.fibre is None else _arrays.vector(self.fibre, f"{name}: fibre"),
             None if self.fibre_2 is None else _arrays.vector(self.fibre_2, f"{name}: fibre_2"),
         )
@@ -77,6 +80,18 @@ class Contact:
     stiffness: float | None = None
     self_contact: bool = True
 
+    def _row(self, name: str) -> _core._Contact:
+        distance, stiffness = (
+            None if value is None else _arrays.number(value, f"{name}: {what}")
+            for what, value in (("distance", self.distance), ("stiffness", self.stiffness))
+        )
+        return (
+            _arrays.number(self.friction, f"{name}: friction"),
+            distance,
+            stiffness,
+            bool(self.self_contact),
+        )
+
 
 @dataclass(frozen=True)
 class RigidKey:
@@ -89,6 +104,19 @@ class RigidKey:
     time: float
     translation: tuple[float, float, float] = (0.0, 0.0, 0.0)
     rotation: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
+
+    def _row(self, name: str) -> _core._Key:
+        rotation = np.asarray(_arrays.sequence(self.rotation, f"{name}: rotation", "4 numbers"))
+        if rotation.shape != (4,) or rotation.dtype.kind not in "fiu":
+            raise ValueError(
+                f"{name}: rotation: expected a quaternion, 4 numbers, got {self.rotation!r}"
+            )
+        w, x, y, z = (float(entry) for entry in rotation)
+        return (
+            _arrays.number(self.time, f"{name}: time"),
+            _arrays.vector(self.translation, f"{name}: translation"),
+            (w, x, y, z),
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,22 +142,26 @@ class Body:
     opacity: float = 1.0
 
     def _to_core(self) -> _core.Body:
-        as_mesh(self.mesh, f"body {self.name!r}: mesh")
-        c, label = self.contact, f"body {self.name!r}"
+        label = f'body "{self.name}"'
+        as_mesh(self.mesh, f"{label}: mesh")
+        regions = _arrays.instance(self.regions, f"{label}: regions", Mapping)
         return _core.Body(
             str(self.name),
             self.mesh._core,
-            self.material._row(label),
-            {int(region): material._row(label) for region, material in self.regions.items()},
-            _arrays.indices(self.fixed_nodes, f"body {self.name!r}: fixed_nodes", None),
-            None
-            if self.rigid is None
-            else [(key.time, key.translation, key.rotation) for key in self.rigid],
-            (c.friction, c.distance, c.stiffness, c.self_contact),
-            self.processor,
-            _arrays.vector(self.initial_velocity, f"body {self.name!r}: initial_velocity"),
-            None if self.color is None else _arrays.vector(self.color, "color"),
-            float(self.opacity),
+            _arrays.instance(self.material, f"{label}: material", Material)._row(label),
+            {
+                _region(region, label): _arrays.instance(
+                    material, f"{label}: regions[{region!r}]", Material
+                )._row(f"{label}: region {region}")
+                for region, material in regions.items()
+            },
+            _arrays.indices(self.fixed_nodes, f"{label}: fixed_nodes", None),
+            None if self.rigid is None else _keys(self.rigid, f"{label}: rigid"),
+            _arrays.instance(self.contact, f"{label}: contact", Contact)._row(label),
+            None if self.processor is None else _processor(self.processor, f"{label}: processor"),
+            _arrays.vector(self.initial_velocity, f"{label}: initial_velocity"),
+            None if self.color is None else _arrays.vector(self.color, f"{label}: color"),
+            _arrays.number(self.opacity, f"{label}: opacity"),
         )
 
     @classmethod
@@ -152,6 +184,28 @@ class Body:
     def __repr__(self) -> str:
         kind = "deformable" if self.rigid is None else "rigid"
         return f"Body({self.name!r}, {kind}, {self.mesh!r})"
+
+
+def _region(number: Any, label: str) -> int:
+    number = _arrays.count(number, f"{label}: regions: number of a region", minimum=-(2**31))
+    if number >= 2**31:
+        raise ValueError(f"{label}: regions: expected a number below 2**31, got {number}")
+    return number
+
+
+def _processor(number: Any, name: str) -> int:
+    number = _arrays.count(number, name, minimum=0)
+    if number >= 2**32:
+        raise ValueError(f"{name}: expected an integer below 2**32, got {number}")
+    return number
+
+
+def _keys(rigid: Any, name: str) -> list[_core._Key]:
+    keys = _arrays.sequence(rigid, name, "RigidKeys, or () for a fixed body")
+    return [
+        _arrays.instance(key, f"{name}[{index}]", RigidKey)._row(f"{name}[{index}]")
+        for index, key in enumerate(keys)
+    ]
 
 
 @dataclass(frozen=True, eq=False)
@@ -209,7 +263,9 @@ class Model:
         gravity: Sequence[float] = (0.0, 0.0, -9.81),
         attachments: Iterable[Attachment] = (),
     ) -> None:
-        items = [bodies] if isinstance(bodies, (Body, Mesh)) else list(bodies)
+        if isinstance(bodies, (Body, Mesh)):
+            bodies = [bodies]
+        items = _arrays.sequence(bodies, "bodies", "palpate.Body or palpate.Mesh objects")
         cores: list[_core.Body] = []
         names: list[str] = []
         for index, item in enumerate(items):
@@ -224,7 +280,8 @@ class Model:
             cores.append((item if name == item.name else replace(item, name=name))._to_core())
             names.append(name)
         ties = []
-        for index, each in enumerate(attachments):
+        given = _arrays.sequence(attachments, "attachments", "palpate.Attachment objects")
+        for index, each in enumerate(given):
             if not isinstance(each, Attachment):
                 raise TypeError(
                     f"attachments[{index}]: expected a palpate.Attachment, "

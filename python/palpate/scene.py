@@ -361,7 +361,7 @@ class Scene:
     def _query(self, body: int | str | None, max_distance: float, **points: Any) -> tuple[Any, ...]:
         arrays = [_arrays.points(array, name) for name, array in points.items()]
         index = None if body is None else body_index(self._names, body)
-        distance = float(max_distance)
+        distance = _arrays.number(max_distance, "max_distance")
         return (*arrays, index, distance)
 
     def memory(self) -> dict[str, float]:
@@ -461,7 +461,9 @@ def _scene_parts(bodies: Any) -> tuple[list[Mesh], list[str], Any]:
     if isinstance(bodies, Model):
         placed = [body.mesh for body in bodies.bodies]
         return placed, [body.name for body in bodies.bodies], bodies._core.structure
-    items = [bodies] if isinstance(bodies, (Mesh, Body)) else list(bodies)
+    if isinstance(bodies, (Mesh, Body)):
+        bodies = [bodies]
+    items = _arrays.sequence(bodies, "bodies", "palpate.Mesh or palpate.Body objects")
     meshes: list[Mesh] = []
     names: list[str] = []
     for index, item in enumerate(items):

@@ -131,13 +131,13 @@ fn errors_of_seg_files_name_file_line_and_index() {
     unknown section: kidney.seg:9: expected a section (nodes, tetrahedra, triangles, regions, fibres, fibres_2, set) or the end of the file, found `edges`
     twice: kidney.seg:7: a second `nodes` section; a mesh has one
     inverted: kidney.seg:9: 1 tetrahedron is inverted (negative volume): 1; repair re-orients them
-    nan: kidney.seg:4: node 1: position (1, 0, NaN) is not finite
-    repeated node: kidney.seg:9: triangle 1: node 2 is named twice
+    nan: kidney.seg:4: node 1: position (1, 0, NaN) is not finite; give coordinates in metres
+    repeated node: kidney.seg:9: triangle 1: node 2 is named twice; name different nodes
     regions first: kidney.seg:7: `regions` has one number for each tetrahedron: give `tetrahedra` first
     set range: kidney.seg: set `a`: node index 9 is out of range (the mesh has 4 nodes)
     set twice: kidney.seg:9: a second set `a`; give each name once
     region: kidney.seg:9: region of tetrahedron 0 of 1: expected a whole number, found `1.5`
-    no elements: kidney.seg: the mesh has neither tetrahedra nor triangles
+    no elements: kidney.seg: the mesh has neither tetrahedra nor triangles; give one of them
     ");
     assert!(error_of("kidney.seg", [b's', b'e', 0xff, 0xfe]).contains("no text file"));
 }
@@ -288,9 +288,9 @@ fn errors_of_vtk_files_name_the_place() {
     negative: kidney.vtk:10: cell 0: -2 is no node index
     too long: kidney.vtk:10: cell 0 of 1: it exceeds the 5 numbers announced for all cells
     three corners: kidney.vtk: cell 0: a tetrahedron has 4 nodes, found 3
-    no types: kidney.vtk: 0 cell types for 1 cells
+    no types: kidney.vtk: 0 cell types for 1 cells; give one for each
     unknown: kidney.vtk:9: expected a section of a .vtk file such as POINTS or CELLS, found `WHAT`
-    hexahedron: kidney.vtk: the mesh has neither tetrahedra nor triangles
+    hexahedron: kidney.vtk: the mesh has neither tetrahedra nor triangles; give one of them
     no points: kidney.vtk: the file has no POINTS section
     "#);
 }

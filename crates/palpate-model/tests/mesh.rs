@@ -99,11 +99,11 @@ fn what_no_repair_can_mend_is_refused_by_both() {
         })
         .collect();
     assert_snapshot!(text.join("\n"), @r"
-    empty: the mesh has neither tetrahedra nor triangles
-    not finite: node 2: position (0, NaN, 0) is not finite
+    empty: the mesh has neither tetrahedra nor triangles; give one of them
+    not finite: node 2: position (0, NaN, 0) is not finite; give coordinates in metres
     out of range: tetrahedron 1: node index 99 is out of range (the mesh has 4 nodes)
     one too far: tetrahedron 0: node index 4 is out of range (the mesh has 4 nodes, counted from 0)
-    repeated node: tetrahedron 1: node 1 is named twice
+    repeated node: tetrahedron 1: node 1 is named twice; name different nodes
     set out of range: set `hilum`: node index 7 is out of range (the mesh has 4 nodes)
     regions: 2 region numbers for 1 tetrahedra; give one for each, or none
     fibres: 3 fibre directions for 1 tetrahedra; give one for each, or none

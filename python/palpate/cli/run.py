@@ -20,11 +20,14 @@ from palpate.cli.output import console, plain
 from palpate.cutting import Stroke
 from palpate.errors import SimulationError
 from palpate.results.album import PICTURES, Album
-from palpate.results.atomic import write_bytes
+from palpate.results.atomic import remove_leftovers, write_bytes
 from palpate.results.drawing import looks_of, upward
 from palpate.results.frames import FrameSeries
 from palpate.results.record import Record
 from palpate.simulation import Simulation
+
+#: Seconds between two checkpoints of a run that saves them.
+_CHECKPOINT_INTERVAL = 60.0
 
 
 @dataclass(frozen=True)
@@ -66,6 +69,10 @@ class Run:
         pictures = [folder / "pictures" / f"{name}.png" for name in PICTURES]
         for old in [folder / "report.json", *pictures]:
             old.unlink(missing_ok=True)
+        remove_leftovers(folder, "report.json")
+        for old in folder.glob("checkpoint.palpate.*.part"):
+            old.unlink(missing_ok=True)
+        self._saved = time.monotonic()
 
     def go(self) -> dict[str, Any]:
         """Step to the end or to Ctrl-C and write everything; returns the report."""
@@ -92,6 +99,8 @@ class Run:
                 advance()
                 if stop:
                     break
+                if options.checkpoint and time.monotonic() - self._saved > _CHECKPOINT_INTERVAL:
+                    self._save()
             if len(record) % options.every:
                 record.observe(simulation)
                 frames.add(simulation)
@@ -99,8 +108,7 @@ class Run:
             frames.finish()
             self.files["frames"] = frames.index
             if options.checkpoint:
-                self.files["checkpoint"] = self._folder / "checkpoint.palpate"
-                simulation.save(self.files["checkpoint"])
+                self._save()
             report = {
                 "model": options.model,
                 "options": {**asdict(options), "time_step": simulation.time_step},
@@ -124,6 +132,11 @@ class Run:
             if options.pictures:
                 self.files["pictures"] = album.write(self._folder / "pictures")[-1]
         return report
+
+    def _save(self) -> None:
+        self.files["checkpoint"] = self._folder / "checkpoint.palpate"
+        self._simulation.save(self.files["checkpoint"])
+        self._saved = time.monotonic()
 
     def _cut(self, step: int) -> None:
         """Make the strokes whose turn it is before this step, counted from 0."""

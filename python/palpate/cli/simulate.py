@@ -78,7 +78,10 @@ def command(
         typer.Option(help="auto: try a step that fails again as 2, 4, ... up to 64 smaller ones."),
     ] = Substeps.ONE,
     checkpoint: Annotated[
-        bool, typer.Option("--checkpoint", help="Save OUTPUT/checkpoint.palpate at the end.")
+        bool,
+        typer.Option(
+            "--checkpoint", help="Save OUTPUT/checkpoint.palpate, at the end and every minute."
+        ),
     ] = False,
     resume: Annotated[
         Path | None, typer.Option(help="Continue from a checkpoint, bit for bit.")

@@ -9,6 +9,7 @@ import numpy as np
 
 from palpate._arrays import Float64Array
 from palpate.model import Model
+from palpate.results.atomic import remove_leftovers
 from palpate.results.stress import VonMises
 from palpate.results.vtu import Grid, write_series
 from palpate.simulation import Simulation
@@ -31,6 +32,8 @@ class FrameSeries:
         (folder / "frames").mkdir(parents=True, exist_ok=True)
         for old in [folder / "simulation.pvd", *(folder / "frames").glob("frame_*.vtu")]:
             old.unlink(missing_ok=True)
+        remove_leftovers(folder, "simulation.pvd")
+        remove_leftovers(folder / "frames", "frame_*.vtu")
 
     def _look_at(self, simulation: Simulation) -> None:
         self._model = model = simulation.model

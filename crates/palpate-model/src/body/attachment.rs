@@ -55,7 +55,7 @@ pub enum AttachmentError {
     /// Bodies that are too far apart.
     #[error(
         "no node of `{first}` is within {} m of `{second}`; the nearest is {} m away",
-        Shortest(*within), Shortest((1e6 * nearest).round() / 1e6)
+        rounded(*within), rounded(*nearest)
     )]
     OutOfReach {
         /// Name of the body whose nodes were to be tied.
@@ -67,6 +67,11 @@ pub enum AttachmentError {
         /// The smallest distance of a node [m].
         nearest: f64,
     },
+}
+
+/// A length to six digits.
+fn rounded(length: f64) -> Shortest {
+    Shortest(format!("{length:.5e}").parse().unwrap_or(length))
 }
 
 /// Axes that turn with a triangle, as columns: along its first edge, across it, along its normal.

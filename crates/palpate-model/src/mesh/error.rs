@@ -75,7 +75,7 @@ impl fmt::Display for ElementKind {
 #[non_exhaustive]
 pub enum MeshError {
     /// A mesh without elements.
-    #[error("the mesh has neither tetrahedra nor triangles")]
+    #[error("the mesh has neither tetrahedra nor triangles; give one of them")]
     Empty,
     /// Repair left nothing.
     #[error("no tetrahedron is left after repair: all {dropped} were flat or repeated")]
@@ -100,7 +100,7 @@ pub enum MeshError {
         limit: usize,
     },
     /// A coordinate is NaN or infinite.
-    #[error("node {node}: position ({}, {}, {}) is not finite", .position[0], .position[1], .position[2])]
+    #[error("node {node}: position ({}, {}, {}) is not finite; give coordinates in metres", .position[0], .position[1], .position[2])]
     NonFiniteNode {
         /// Index of the node.
         node: u32,
@@ -123,7 +123,7 @@ pub enum MeshError {
         node_count: usize,
     },
     /// An element names a node twice.
-    #[error("{kind} {element}: node {node} is named twice")]
+    #[error("{kind} {element}: node {node} is named twice; name different nodes")]
     RepeatedNode {
         /// Kind of the element.
         kind: ElementKind,

@@ -211,7 +211,11 @@ impl Cells {
         mut notes: Vec<String>,
     ) -> Result<Selection, String> {
         if self.types.len() != self.len() {
-            return Err(format!("{} cell types for {} cells", self.types.len(), self.len()));
+            return Err(format!(
+                "{} cell types for {} cells; give one for each",
+                self.types.len(),
+                self.len()
+            ));
         }
         let volumetric = |cell_type: u8| [TETRAHEDRON, QUADRATIC_TETRAHEDRON].contains(&cell_type);
         let has_tetrahedra = self.types.iter().any(|&cell_type| volumetric(cell_type));
