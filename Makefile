@@ -9,7 +9,7 @@ SOURCES := pyproject.toml Cargo.toml Cargo.lock $(shell find crates -name '*.rs'
 CRATES := --workspace --exclude palpate-python
 
 .DEFAULT_GOAL := help
-.PHONY: help install run view test test-rust test-python soak soak-mechanics fuzz lint deny format bench docs wheel crates models three clean
+.PHONY: help install run view test test-rust test-python bits kills soak soak-mechanics fuzz lint deny format bench docs wheel crates models three clean
 
 help: ## Show this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /\1\t/' | expand -t 14
@@ -37,6 +37,14 @@ test-rust:
 
 test-python: install
 	$(BIN)/python -m pytest
+
+bits: ## The same bits in a release and in a debug build
+	rm -f target/bits
+	PALPATE_BITS=$(abspath target)/bits cargo test --release --locked -p palpate --test bits
+	PALPATE_BITS=$(abspath target)/bits cargo test --locked -p palpate --test bits
+
+kills: install ## Kill every command a hundred times at random
+	PALPATE_KILLS=100 $(BIN)/python -m pytest tests/test_interruption.py
 
 soak: ## Compare with the double loop on fresh random scenes for MINUTES (10)
 	PALPATE_SOAK=$(or $(MINUTES),10) cargo test --release --locked -p palpate-contact \

@@ -122,6 +122,22 @@ def test_checkpoints_continue_bit_for_bit(falling, tmp_path):
     assert [each.name for each in tmp_path.iterdir()] == ["run.palpate"]
 
 
+def test_it_goes_on_with_the_same_bits_from_any_step(tmp_path):
+    path = tmp_path / "run.palpate"
+    simulation = palpate.Simulation("small")  # its bodies turn, fall on each other and come to rest
+    for _ in range(16):
+        snapshot = simulation.snapshot()
+        simulation.save(path)
+        simulation.step(9)
+        expected = [positions.tobytes() for positions in simulation.positions]
+        loaded = palpate.Simulation.load(path)
+        loaded.step(9)
+        assert [positions.tobytes() for positions in loaded.positions] == expected
+        simulation.restore(snapshot)
+        simulation.step(9)
+        assert [positions.tobytes() for positions in simulation.positions] == expected
+
+
 def test_damaged_checkpoints_are_refused(falling, tmp_path):
     path = tmp_path / "run.palpate"
     palpate.Simulation(falling).save(path)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any, TypeVar
 
 import numpy as np
@@ -83,7 +83,7 @@ def number(value: Any, name: str) -> float:
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, float, np.number)):
         raise TypeError(f"{name}: expected a number, got {type(value).__name__}")
     try:
-        return float(value)  # type: ignore[arg-type]
+        return float(value)
     except (OverflowError, TypeError):
         raise ValueError(f"{name}: expected a number that a float can hold, got {value}") from None
 
@@ -97,6 +97,13 @@ def instance(value: Any, name: str, kind: type[_T]) -> _T:
     raise TypeError(
         f"{name}: expected {article} {where}{kind.__name__}, got {type(value).__name__}"
     )
+
+
+def mapping(value: Any, name: str) -> Mapping[Any, Any]:
+    """``value`` if it maps names to something."""
+    if isinstance(value, Mapping):
+        return value
+    raise TypeError(f"{name}: expected a mapping such as a dict, got {type(value).__name__}")
 
 
 def sequence(value: Any, name: str, expected: str) -> list[Any]:

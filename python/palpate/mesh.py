@@ -75,7 +75,7 @@ class Mesh:
             )
         sets = {
             str(name): _arrays.indices(members, f"node_sets[{name!r}]", None)
-            for name, members in _arrays.instance(node_sets or {}, "node_sets", Mapping).items()
+            for name, members in _arrays.mapping(node_sets or {}, "node_sets").items()
         }
         self._core, self._notes = _core.Mesh.build(
             _arrays.points(nodes, "nodes"),

@@ -144,7 +144,7 @@ class Body:
     def _to_core(self) -> _core.Body:
         label = f'body "{self.name}"'
         as_mesh(self.mesh, f"{label}: mesh")
-        regions = _arrays.instance(self.regions, f"{label}: regions", Mapping)
+        regions = _arrays.mapping(self.regions, f"{label}: regions")
         return _core.Body(
             str(self.name),
             self.mesh._core,
@@ -187,17 +187,18 @@ class Body:
 
 
 def _region(number: Any, label: str) -> int:
-    number = _arrays.count(number, f"{label}: regions: number of a region", minimum=-(2**31))
-    if number >= 2**31:
-        raise ValueError(f"{label}: regions: expected a number below 2**31, got {number}")
-    return number
+    name = f"{label}: regions: number of a region"
+    region = _arrays.count(number, name, minimum=-(2**31))
+    if region >= 2**31:
+        raise ValueError(f"{name}: expected an integer below 2**31, got {region}")
+    return region
 
 
 def _processor(number: Any, name: str) -> int:
-    number = _arrays.count(number, name, minimum=0)
-    if number >= 2**32:
-        raise ValueError(f"{name}: expected an integer below 2**32, got {number}")
-    return number
+    processor = _arrays.count(number, name, minimum=0)
+    if processor >= 2**32:
+        raise ValueError(f"{name}: expected an integer below 2**32, got {processor}")
+    return processor
 
 
 def _keys(rigid: Any, name: str) -> list[_core._Key]:
