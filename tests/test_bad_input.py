@@ -867,8 +867,8 @@ TABLE: list[tuple[str, Callable[[World], Any], type[Exception], str]] = [
             attachments=[palpate.Attachment(0, 1)],
         ),
         ValueError,
-        "attachments[0]: no node of `body_1` is within 0.569036 m of `body_2`; the "
-        "nearest is 13.8564 m away",
+        "attachments[0]: no node of `body_1` is within 0.569 m of `body_2`; the "
+        "nearest is 13.86 m away",
     ),
     (
         "simulation-time-step",

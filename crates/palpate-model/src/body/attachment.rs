@@ -69,9 +69,9 @@ pub enum AttachmentError {
     },
 }
 
-/// A length to six digits.
+/// A length to four digits.
 fn rounded(length: f64) -> Shortest {
-    Shortest(format!("{length:.5e}").parse().unwrap_or(length))
+    Shortest(format!("{length:.3e}").parse().unwrap_or(length))
 }
 
 /// Axes that turn with a triangle, as columns: along its first edge, across it, along its normal.
