@@ -892,7 +892,7 @@ TABLE: list[tuple[str, Callable[[World], Any], type[Exception], str]] = [
         "simulation-method",
         lambda world: palpate.Simulation([world.mesh], method="guess"),
         ValueError,
-        "method: expected one of wide, paper, all-pairs, hash; got 'guess'",
+        "method: expected one of paper, all-pairs, hash, wide; got 'guess'",
     ),
     (
         "simulation-membrane",

@@ -122,7 +122,7 @@ def test_bad_positions_leave_the_scene_as_it_was(cube, positions, error, text):
     [
         ({"leaf_size": 0}, ValueError, "leaf_size"),
         ({"leaf_size": 1.5}, TypeError, "leaf_size"),
-        ({"method": "magic"}, ValueError, "method: expected one of wide, paper"),
+        ({"method": "magic"}, ValueError, "method: expected one of paper, all-pairs, hash, wide"),
         ({"split": "best"}, ValueError, "split"),
         ({"threads": 0}, ValueError, "threads"),
     ],

@@ -281,6 +281,17 @@ impl Scene {
         self.bodies[body].tree()
     }
 
+    /// Starts the threads anew: a process that was forked has none of its parent's.
+    ///
+    /// # Errors
+    /// If they could not be started.
+    pub fn restart_threads(&mut self) -> Result<(), SceneError> {
+        let gone = std::mem::replace(&mut self.pool, start_threads(self.options.threads)?);
+        // Its end would be waited for in vain.
+        std::mem::forget(gone);
+        Ok(())
+    }
+
     /// How the scene was built.
     pub fn options(&self) -> &SceneOptions {
         &self.options

@@ -8,6 +8,7 @@
 mod arrays;
 mod cutting;
 mod errors;
+mod held;
 mod mesh;
 mod model;
 mod scene;

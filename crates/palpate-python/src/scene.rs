@@ -3,14 +3,13 @@
 mod points;
 mod queries;
 
-use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2};
 use palpate::contact::{IntersectionOptions, Method, ProximityOptions, Split};
 use palpate::cutting::cut;
 use palpate::geometry::{Aabb, Point};
-use palpate::{Scene, SceneOptions};
+use palpate::{Scene, SceneError, SceneOptions};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
@@ -18,6 +17,7 @@ use pyo3::types::{PyDict, PyTuple};
 use crate::arrays::{matrix, points, rows, vector};
 use crate::cutting::{self, ChangeColumns, Options, PyBlade, change_columns, report_row};
 use crate::errors::raise;
+use crate::held::{Held, Threaded};
 use crate::mesh::PyMesh;
 use crate::model::structure_from_python;
 
@@ -31,12 +31,28 @@ type CutRow<'py> = (usize, ChangeColumns<'py>, Bound<'py, PyDict>);
 /// Bodies and their bounding trees. The lock lets two Python threads use one scene in turn.
 #[pyclass(frozen, name = "Scene", module = "palpate._core")]
 pub(crate) struct PyScene {
-    scene: Mutex<(Scene, Duration)>,
+    inside: Held<Inside>,
 }
 
-impl PyScene {
-    fn lock(&self) -> MutexGuard<'_, (Scene, Duration)> {
-        self.scene.lock().unwrap_or_else(PoisonError::into_inner)
+/// What the lock guards.
+pub(crate) struct Inside {
+    scene: Scene,
+    update_time: Duration,
+    /// Memory for copies of positions.
+    given: Vec<Vec<Point>>,
+}
+
+impl Inside {
+    /// Another thread may have removed bodies since Python checked the index.
+    fn check(&self, body: usize) -> Result<(), SceneError> {
+        let count = self.scene.body_count();
+        if body < count { Ok(()) } else { Err(SceneError::BodyOutOfRange { body, count }) }
+    }
+}
+
+impl Threaded for Inside {
+    fn restart_threads(&mut self) -> bool {
+        self.scene.restart_threads().is_ok()
     }
 }
 
@@ -56,22 +72,24 @@ impl PyScene {
         let options = scene_options(leaf_size, split, method, threads)?;
         let meshes = meshes.iter().map(|mesh| mesh.mesh.clone()).collect();
         let scene = raise(py, py.detach(|| Scene::new(meshes, structure.as_ref(), options)))?;
-        Ok(Self { scene: Mutex::new((scene, Duration::ZERO)) })
+        Ok(Self {
+            inside: Held::new(Inside { scene, update_time: Duration::ZERO, given: Vec::new() }),
+        })
     }
 
     fn add(&self, py: Python<'_>, mesh: &PyMesh) -> usize {
         let mesh = mesh.mesh.clone();
-        py.detach(|| self.lock().0.add(mesh))
+        py.detach(|| self.inside.lock().scene.add(mesh))
     }
 
     fn remove(&self, py: Python<'_>, body: usize) -> PyResult<()> {
-        raise(py, py.detach(|| self.lock().0.remove(body)))?;
+        raise(py, py.detach(|| self.inside.lock().scene.remove(body)))?;
         Ok(())
     }
 
     fn replace(&self, py: Python<'_>, body: usize, mesh: &PyMesh) -> PyResult<()> {
         let mesh = mesh.mesh.clone();
-        raise(py, py.detach(|| self.lock().0.replace(body, mesh)))?;
+        raise(py, py.detach(|| self.inside.lock().scene.replace(body, mesh)))?;
         Ok(())
     }
 
@@ -85,9 +103,12 @@ impl PyScene {
     ) -> PyResult<Vec<CutRow<'py>>> {
         let options = cutting::options(options);
         let cuts = py.detach(|| {
-            let mut guard = self.lock();
-            let scene = &mut guard.0;
+            let mut guard = self.inside.lock();
             let mut cuts = Vec::new();
+            for &body in &bodies {
+                guard.check(body).map_err(|error| error.to_string())?;
+            }
+            let scene = &mut guard.scene;
             for body in bodies {
                 let found = cut(scene.mesh(body), scene.positions(body), &blade.blade, &options);
                 let named = |error| format!("body {body} cannot be cut: {error}");
@@ -115,28 +136,44 @@ impl PyScene {
         body: usize,
         tetrahedra: Vec<u32>,
     ) -> PyResult<ChangeColumns<'py>> {
-        let change = raise(py, self.lock().0.mesh(body).remove(&tetrahedra))?;
-        raise(py, py.detach(|| self.lock().0.change_body(body, &change)))?;
+        let guard = self.inside.lock_attached(py);
+        raise(py, guard.check(body))?;
+        let mesh = guard.scene.mesh(body).clone();
+        drop(guard);
+        let change = raise(py, py.detach(|| mesh.remove(&tetrahedra)))?;
+        raise(py, py.detach(|| self.inside.lock().scene.change_body(body, &change)))?;
         change_columns(py, &change)
     }
 
     fn update(&self, py: Python<'_>, positions: Vec<PyReadonlyArray2<'_, f64>>) -> PyResult<()> {
-        let slices: Vec<&[Point]> =
-            positions.iter().map(|array| points(array, "positions")).collect::<PyResult<_>>()?;
-        // Not detached: the arrays belong to Python, which could change them meanwhile.
-        let mut guard = self.lock();
-        let stats = raise(py, guard.0.update(&slices))?;
-        guard.1 = stats.time;
+        // Copied: while Python's lock is let go its arrays may change.
+        let mut given = std::mem::take(&mut self.inside.lock_attached(py).given);
+        given.resize_with(positions.len(), Vec::new);
+        for (copy, array) in given.iter_mut().zip(&positions) {
+            copy.clear();
+            copy.extend_from_slice(points(array, "positions")?);
+        }
+        let updated = py.detach(|| {
+            let mut guard = self.inside.lock();
+            let slices: Vec<&[Point]> = given.iter().map(Vec::as_slice).collect();
+            let updated = guard.scene.update(&slices);
+            guard.given = given;
+            updated
+        });
+        self.inside.lock_attached(py).update_time = raise(py, updated)?.time;
         Ok(())
     }
 
     #[getter]
-    fn update_time(&self) -> f64 {
-        self.lock().1.as_secs_f64()
+    fn update_time(&self, py: Python<'_>) -> f64 {
+        self.inside.lock_attached(py).update_time.as_secs_f64()
     }
 
     fn positions<'py>(&self, py: Python<'py>, body: usize) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let copy = self.lock().0.positions(body).to_vec();
+        let guard = self.inside.lock_attached(py);
+        raise(py, guard.check(body))?;
+        let copy = guard.scene.positions(body).to_vec();
+        drop(guard);
         matrix(py, copy)
     }
 
@@ -176,7 +213,7 @@ impl PyScene {
     }
 
     fn ignore(&self, py: Python<'_>, body_a: usize, body_b: usize, ignored: bool) -> PyResult<()> {
-        raise(py, self.lock().0.ignore(body_a, body_b, ignored))
+        raise(py, self.inside.lock_attached(py).scene.ignore(body_a, body_b, ignored))
     }
 
     fn set_groups(
@@ -194,7 +231,7 @@ impl PyScene {
         };
         let groups: Vec<u32> =
             groups.as_array().iter().enumerate().map(group).collect::<PyResult<_>>()?;
-        raise(py, self.lock().0.set_groups(body, &groups))
+        raise(py, self.inside.lock_attached(py).scene.set_groups(body, &groups))
     }
 
     fn penetration<'py>(
@@ -203,8 +240,8 @@ impl PyScene {
         self_contact: bool,
     ) -> PyResult<(PenetrationArrays<'py>, StatsRow)> {
         let (nodes, stats) = py.detach(|| {
-            let mut guard = self.lock();
-            let found = guard.0.penetration(&|a, b| self_contact || a != b);
+            let mut guard = self.inside.lock();
+            let found = guard.scene.penetration(&|a, b| self_contact || a != b);
             (found.nodes.clone(), stats_row(&found.stats))
         });
         Ok((penetration_arrays(py, &nodes)?, stats))
@@ -219,9 +256,12 @@ impl PyScene {
         body: Option<usize>,
         max_distance: f64,
     ) -> PyResult<SurfacePointArrays<'py>> {
-        let points = rows(&points, "points")?;
-        let mut guard = self.lock();
-        surface_point_arrays(py, raise(py, guard.0.closest(points, body, max_distance))?)
+        let points = rows(&points, "points")?.to_vec();
+        let found = py.detach(|| {
+            let mut guard = self.inside.lock();
+            guard.scene.closest(&points, body, max_distance).map(<[_]>::to_vec)
+        });
+        surface_point_arrays(py, &raise(py, found)?)
     }
 
     fn contains<'py>(
@@ -230,9 +270,10 @@ impl PyScene {
         points: PyReadonlyArray2<'py, f64>,
         body: Option<usize>,
     ) -> PyResult<Bound<'py, PyArray1<bool>>> {
-        let points = rows(&points, "points")?;
-        let mut guard = self.lock();
-        Ok(vector(py, raise(py, guard.0.contains(points, body))?.to_vec()))
+        let points = rows(&points, "points")?.to_vec();
+        let found =
+            py.detach(|| self.inside.lock().scene.contains(&points, body).map(<[_]>::to_vec));
+        Ok(vector(py, raise(py, found)?))
     }
 
     fn cast<'py>(
@@ -243,14 +284,17 @@ impl PyScene {
         body: Option<usize>,
         max_distance: f64,
     ) -> PyResult<SurfacePointArrays<'py>> {
-        let (origins, directions) = (rows(&origins, "origins")?, rows(&directions, "directions")?);
-        let mut guard = self.lock();
-        let found = raise(py, guard.0.cast(origins, directions, body, max_distance))?;
-        surface_point_arrays(py, found)
+        let origins = rows(&origins, "origins")?.to_vec();
+        let directions = rows(&directions, "directions")?.to_vec();
+        let found = py.detach(|| {
+            let mut guard = self.inside.lock();
+            guard.scene.cast(&origins, &directions, body, max_distance).map(<[_]>::to_vec)
+        });
+        surface_point_arrays(py, &raise(py, found)?)
     }
 
     fn memory<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let memory = self.lock().0.memory();
+        let memory = self.inside.lock_attached(py).scene.memory();
         let row = PyDict::new(py);
         row.set_item("nodes", memory.nodes)?;
         row.set_item("elements", memory.elements)?;
@@ -270,13 +314,18 @@ impl PyScene {
         body: usize,
         level: usize,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let boxes = py.detach(|| level_boxes(&self.lock().0, body, level));
+        let boxes = py.detach(|| {
+            let guard = self.inside.lock();
+            guard.check(body).map(|()| level_boxes(&guard.scene, body, level))
+        });
+        let boxes = raise(py, boxes)?;
         matrix(py, boxes)
     }
 
     fn tree_stats<'py>(&self, py: Python<'py>, body: usize) -> PyResult<Bound<'py, PyDict>> {
-        let guard = self.lock();
-        let tree = guard.0.tree(body);
+        let guard = self.inside.lock_attached(py);
+        raise(py, guard.check(body))?;
+        let tree = guard.scene.tree(body);
         let stats = tree.stats();
         let row = PyDict::new(py);
         row.set_item("elements", stats.element_count)?;

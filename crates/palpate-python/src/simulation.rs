@@ -1,7 +1,6 @@
 //! `palpate._core.Simulation`: the step loop, its state and its checkpoints.
 
 use std::path::PathBuf;
-use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use glam::DQuat;
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2};
@@ -17,6 +16,7 @@ use pyo3::types::{IntoPyDict, PyDict, PyTuple};
 use crate::arrays::{index, index_matrix, index_vector, matrix, points, rows, vector};
 use crate::cutting::{self, ChangeColumns, Options, PyBlade, change_columns, report_row};
 use crate::errors::raise;
+use crate::held::{Held, Threaded};
 use crate::model::PyModel;
 use crate::scene::{StatsRow, intersection_rows, level_boxes, scene_options};
 use crate::tool_loop::PyToolLoop;
@@ -38,20 +38,22 @@ impl PySnapshot {
 /// Bodies in motion. The lock lets two Python threads use one simulation in turn.
 #[pyclass(frozen, name = "Simulation", module = "palpate._core")]
 pub(crate) struct PySimulation {
-    simulation: Mutex<Simulation>,
+    simulation: Held<Simulation>,
+}
+
+impl Threaded for Simulation {
+    fn restart_threads(&mut self) -> bool {
+        Simulation::restart_threads(self).is_ok()
+    }
 }
 
 impl PySimulation {
-    fn lock(&self) -> MutexGuard<'_, Simulation> {
-        self.simulation.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
     fn per_body<'py>(
         &self,
         py: Python<'py>,
         values: impl Fn(&Simulation, usize) -> Vec<Point>,
     ) -> PyResult<Bound<'py, PyTuple>> {
-        let guard = self.lock();
+        let guard = self.simulation.lock_attached(py);
         let arrays = (0..guard.model().bodies.len())
             .map(|body| matrix(py, values(&guard, body)))
             .collect::<PyResult<Vec<_>>>()?;
@@ -126,27 +128,27 @@ impl PySimulation {
         let options = SimulationOptions { time_step, scene, threads, substeps };
         let (py, model) = (model.py(), model.model.clone());
         let simulation = raise(py, py.detach(|| Simulation::new(model, options)))?;
-        Ok(Self { simulation: Mutex::new(simulation) })
+        Ok(Self { simulation: Held::new(simulation) })
     }
 
     #[getter]
-    fn model(&self) -> PyModel {
-        PyModel { model: self.lock().model().clone() }
+    fn model(&self, py: Python<'_>) -> PyModel {
+        PyModel { model: self.simulation.lock_attached(py).model().clone() }
     }
 
     #[getter]
-    fn time(&self) -> f64 {
-        self.lock().time()
+    fn time(&self, py: Python<'_>) -> f64 {
+        self.simulation.lock_attached(py).time()
     }
 
     #[getter]
-    fn time_step(&self) -> f64 {
-        self.lock().options().time_step
+    fn time_step(&self, py: Python<'_>) -> f64 {
+        self.simulation.lock_attached(py).options().time_step
     }
 
     #[getter]
-    fn auto_substeps(&self) -> bool {
-        self.lock().options().substeps == Substeps::Auto
+    fn auto_substeps(&self, py: Python<'_>) -> bool {
+        self.simulation.lock_attached(py).options().substeps == Substeps::Auto
     }
 
     #[getter]
@@ -166,7 +168,7 @@ impl PySimulation {
 
     #[getter]
     fn contacts<'py>(&self, py: Python<'py>) -> PyResult<ContactColumns<'py>> {
-        let guard = self.lock();
+        let guard = self.simulation.lock_attached(py);
         let contacts = guard.contacts();
         let kinds = contacts.iter().map(|c| i32::from(c.kind == PairKind::EdgeEdge)).collect();
         let bodies: Vec<_> = contacts.iter().map(|c| c.bodies).collect();
@@ -193,7 +195,7 @@ impl PySimulation {
             for _ in 0..count {
                 // One step at a time, so that Ctrl-C is answered between them.
                 py.check_signals()?;
-                let report = raise(py, py.detach(|| self.lock().step()))?;
+                let report = raise(py, py.detach(|| self.simulation.lock().step()))?;
                 summed += report.times;
                 for (sum, (_, time)) in stages.iter_mut().zip(report.stages()) {
                     *sum += time.as_secs_f64();
@@ -236,20 +238,20 @@ impl PySimulation {
         target: Vec3,
         stiffness: f64,
     ) -> PyResult<u64> {
-        raise(py, self.lock().pull(body, node, target.into(), stiffness))
+        raise(py, self.simulation.lock_attached(py).pull(body, node, target.into(), stiffness))
     }
 
     fn set_pull_target(&self, py: Python<'_>, pull: u64, target: Vec3) -> PyResult<()> {
-        raise(py, self.lock().set_pull_target(pull, target.into()))
+        raise(py, self.simulation.lock_attached(py).set_pull_target(pull, target.into()))
     }
 
     fn release(&self, py: Python<'_>, pull: u64) -> PyResult<()> {
-        raise(py, self.lock().release(pull))
+        raise(py, self.simulation.lock_attached(py).release(pull))
     }
 
     /// Body, node, target, stiffness and force of a spring; `None` if it is gone.
-    fn pulled(&self, pull: u64) -> Option<(u32, u32, Vec3, f64, Vec3)> {
-        let guard = self.lock();
+    fn pulled(&self, py: Python<'_>, pull: u64) -> Option<(u32, u32, Vec3, f64, Vec3)> {
+        let guard = self.simulation.lock_attached(py);
         let found = guard.pulls().iter().find(|each| each.id == pull)?;
         let Pull { body, node, target, stiffness, force, .. } = *found;
         Some((body, node, target.into(), stiffness, force.into()))
@@ -264,7 +266,7 @@ impl PySimulation {
         let entries = nodes.as_slice()?.iter().enumerate();
         let nodes: Vec<u32> =
             entries.map(|(row, &node)| index(node, "nodes", row)).collect::<PyResult<_>>()?;
-        raise(py, py.detach(|| self.lock().drive(body, &nodes)))
+        raise(py, py.detach(|| self.simulation.lock().drive(body, &nodes)))
     }
 
     fn set_drive_targets(
@@ -273,16 +275,19 @@ impl PySimulation {
         drive: u64,
         targets: PyReadonlyArray2<'_, f64>,
     ) -> PyResult<()> {
-        raise(py, self.lock().set_drive_targets(drive, points(&targets, "path")?))
+        raise(
+            py,
+            self.simulation.lock_attached(py).set_drive_targets(drive, points(&targets, "path")?),
+        )
     }
 
     fn release_drive(&self, py: Python<'_>, drive: u64) -> PyResult<()> {
-        raise(py, py.detach(|| self.lock().release_drive(drive)))
+        raise(py, py.detach(|| self.simulation.lock().release_drive(drive)))
     }
 
     /// Body, nodes (ascending), targets and forces of a drive; `None` if it is gone.
     fn driven<'py>(&self, py: Python<'py>, drive: u64) -> PyResult<Option<DriveRow<'py>>> {
-        let guard = self.lock();
+        let guard = self.simulation.lock_attached(py);
         let Some(found) = guard.drives().iter().find(|each| each.id == drive) else {
             return Ok(None);
         };
@@ -301,17 +306,17 @@ impl PySimulation {
     ) -> PyResult<()> {
         let (w, x, y, z) = rotation;
         let rotation = DQuat::from_xyzw(x, y, z, w);
-        raise(py, self.lock().set_pose(body, rotation, translation.into()))
+        raise(py, self.simulation.lock_attached(py).set_pose(body, rotation, translation.into()))
     }
 
     /// Columns of the rotation, and the translation.
     fn tool_pose(&self, py: Python<'_>, body: usize) -> PyResult<([[f64; 3]; 3], [f64; 3])> {
-        let (rotation, translation) = raise(py, self.lock().tool_pose(body))?;
+        let (rotation, translation) = raise(py, self.simulation.lock_attached(py).tool_pose(body))?;
         Ok((rotation.to_cols_array_2d(), translation.to_array()))
     }
 
     fn tool_force(&self, py: Python<'_>, body: usize) -> PyResult<(Vec3, Vec3)> {
-        let [force, torque] = raise(py, self.lock().tool_force(body))?;
+        let [force, torque] = raise(py, self.simulation.lock_attached(py).tool_force(body))?;
         Ok((force.into(), torque.into()))
     }
 
@@ -327,7 +332,7 @@ impl PySimulation {
         options: Options,
     ) -> PyResult<ChangeRows<'py>> {
         let options = cutting::options(options);
-        let report = raise(py, py.detach(|| self.lock().cut(&blade.blade, &options)))?;
+        let report = raise(py, py.detach(|| self.simulation.lock().cut(&blade.blade, &options)))?;
         change_rows(py, &report)
     }
 
@@ -337,19 +342,19 @@ impl PySimulation {
         body: usize,
         tetrahedra: Vec<u32>,
     ) -> PyResult<ChangeRows<'py>> {
-        let report = raise(py, py.detach(|| self.lock().remove(body, &tetrahedra)))?;
+        let report = raise(py, py.detach(|| self.simulation.lock().remove(body, &tetrahedra)))?;
         change_rows(py, &report)
     }
 
     /// For each body now the one before and what became of its mesh; empty when nothing came apart.
     fn separate<'py>(&self, py: Python<'py>) -> PyResult<Vec<(usize, ChangeColumns<'py>)>> {
-        let parts = raise(py, py.detach(|| self.lock().separate()))?;
+        let parts = raise(py, py.detach(|| self.simulation.lock().separate()))?;
         parts.iter().map(|(old, change)| Ok((*old, change_columns(py, change)?))).collect()
     }
 
     /// Writes the model as it is now; returns the files.
     fn write_model(&self, py: Python<'_>, path: PathBuf) -> PyResult<Vec<PathBuf>> {
-        let model = self.lock().model().clone();
+        let model = self.simulation.lock_attached(py).model().clone();
         raise(py, py.detach(|| palpate::model::write_model(&path, &model)))
     }
 
@@ -359,7 +364,10 @@ impl PySimulation {
         body: usize,
         positions: PyReadonlyArray2<'_, f64>,
     ) -> PyResult<()> {
-        raise(py, self.lock().set_positions(body, points(&positions, "positions")?))
+        raise(
+            py,
+            self.simulation.lock_attached(py).set_positions(body, points(&positions, "positions")?),
+        )
     }
 
     fn set_velocities(
@@ -368,7 +376,12 @@ impl PySimulation {
         body: usize,
         velocities: PyReadonlyArray2<'_, f64>,
     ) -> PyResult<()> {
-        raise(py, self.lock().set_velocities(body, points(&velocities, "velocities")?))
+        raise(
+            py,
+            self.simulation
+                .lock_attached(py)
+                .set_velocities(body, points(&velocities, "velocities")?),
+        )
     }
 
     fn set_forces(
@@ -377,7 +390,7 @@ impl PySimulation {
         body: usize,
         forces: PyReadonlyArray2<'_, f64>,
     ) -> PyResult<()> {
-        raise(py, self.lock().set_forces(body, points(&forces, "forces")?))
+        raise(py, self.simulation.lock_attached(py).set_forces(body, points(&forces, "forces")?))
     }
 
     fn intersections<'py>(
@@ -387,7 +400,7 @@ impl PySimulation {
     ) -> PyResult<(Bound<'py, PyArray2<i32>>, StatsRow)> {
         let options = IntersectionOptions { self_contact, ..IntersectionOptions::default() };
         let found = py.detach(|| {
-            let mut guard = self.lock();
+            let mut guard = self.simulation.lock();
             let scene = guard.scene()?;
             Ok::<_, palpate::SimulationError>(intersection_rows(scene.intersections(&options)))
         });
@@ -403,7 +416,7 @@ impl PySimulation {
         level: usize,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let boxes = py.detach(|| {
-            let mut guard = self.lock();
+            let mut guard = self.simulation.lock();
             Ok::<_, palpate::SimulationError>(level_boxes(guard.scene()?, body, level))
         });
         matrix(py, raise(py, boxes)?)
@@ -415,19 +428,19 @@ impl PySimulation {
         py: Python<'py>,
         body: usize,
     ) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
-        let stress = py.detach(|| self.lock().cauchy_stress(body));
+        let stress = py.detach(|| self.simulation.lock().cauchy_stress(body));
         stress.map(|rows| matrix(py, rows)).transpose()
     }
 
     /// Bytes of each body's factor as a solve reads it; 0 for a rigid one.
-    fn factor_bytes(&self) -> Vec<usize> {
-        let guard = self.lock();
+    fn factor_bytes(&self, py: Python<'_>) -> Vec<usize> {
+        let guard = self.simulation.lock_attached(py);
         let bytes = |body| guard.dynamics().factor_stats(body).map_or(0, |stats| stats.bytes);
         (0..guard.model().bodies.len()).map(bytes).collect()
     }
 
     fn energy<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let energy = self.lock().energy();
+        let energy = py.detach(|| self.simulation.lock().energy());
         let row = PyDict::new(py);
         row.set_item("kinetic", energy.kinetic)?;
         row.set_item("elastic", energy.elastic)?;
@@ -435,25 +448,25 @@ impl PySimulation {
         Ok(row)
     }
 
-    fn snapshot(&self) -> PySnapshot {
-        PySnapshot { snapshot: self.lock().snapshot() }
+    fn snapshot(&self, py: Python<'_>) -> PySnapshot {
+        PySnapshot { snapshot: self.simulation.lock_attached(py).snapshot() }
     }
 
     fn restore(&self, py: Python<'_>, snapshot: &PySnapshot) -> PyResult<()> {
-        raise(py, py.detach(|| self.lock().restore(&snapshot.snapshot)))
+        raise(py, py.detach(|| self.simulation.lock().restore(&snapshot.snapshot)))
     }
 
     fn reset(&self, py: Python<'_>) -> PyResult<()> {
-        raise(py, py.detach(|| self.lock().reset()))
+        raise(py, py.detach(|| self.simulation.lock().reset()))
     }
 
     fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
-        raise(py, py.detach(|| self.lock().save(&path)))
+        raise(py, py.detach(|| self.simulation.lock().save(&path)))
     }
 
     #[staticmethod]
     fn load(py: Python<'_>, path: PathBuf, threads: usize) -> PyResult<Self> {
         let simulation = raise(py, py.detach(|| Simulation::load(&path, threads)))?;
-        Ok(Self { simulation: Mutex::new(simulation) })
+        Ok(Self { simulation: Held::new(simulation) })
     }
 }

@@ -452,6 +452,15 @@ impl Simulation {
         self.dynamics.energy()
     }
 
+    /// Starts the threads anew: a process that was forked has none of its parent's.
+    ///
+    /// # Errors
+    /// If they could not be started.
+    pub fn restart_threads(&mut self) -> Result<(), SimulationError> {
+        self.scene.restart_threads()?;
+        Ok(self.dynamics.restart_threads()?)
+    }
+
     /// The mechanics, for momenta and factors.
     pub fn dynamics(&self) -> &Dynamics {
         &self.dynamics

@@ -35,7 +35,8 @@ impl PyScene {
         py: Python<'py>,
         options: IntersectionOptions,
     ) -> PyResult<IntersectionColumns<'py>> {
-        let (rows, stats) = py.detach(|| intersection_rows(self.lock().0.intersections(&options)));
+        let (rows, stats) =
+            py.detach(|| intersection_rows(self.inside.lock().scene.intersections(&options)));
         Ok((index_matrix(py, &rows)?, stats))
     }
 
@@ -48,8 +49,8 @@ impl PyScene {
     ) -> PyResult<ProximityColumns<'py>> {
         let distance = |a: usize, b: usize| (self_contact || a != b).then_some(distance);
         let (pairs, stats) = py.detach(|| {
-            let mut guard = self.lock();
-            let found = guard.0.proximity_with(&distance, &options);
+            let mut guard = self.inside.lock();
+            let found = guard.scene.proximity_with(&distance, &options);
             (found.pairs.clone(), stats_row(&found.stats))
         });
         let kind = |pair: &ProximityPair| match pair.kind {
@@ -73,7 +74,7 @@ impl PyScene {
         py: Python<'py>,
         options: IntersectionOptions,
     ) -> PyResult<Bound<'py, PyTuple>> {
-        let nodes = py.detach(|| self.lock().0.contact_nodes(&options).nodes.clone());
+        let nodes = py.detach(|| self.inside.lock().scene.contact_nodes(&options).nodes.clone());
         PyTuple::new(py, nodes.iter().map(|nodes| index_vector(py, nodes)))
     }
 }

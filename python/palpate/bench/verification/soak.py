@@ -1,23 +1,38 @@
-"""Random pulling of case 2 for minutes: nothing breaks or stays inside, memory is flat.
+"""Random pulling, pushing and cutting of case 2 for minutes: nothing breaks, stays inside or grows.
 
 ``python -m palpate.bench.verification.soak MINUTES [SEED]`` prints a line every 500 steps and ends
-with an error when a promise is broken.
+with an error when a promise is broken. Rounds of hands at work begin at the start again, so that
+the first and the last of them can be compared.
 """
 
 from __future__ import annotations
 
+import gc
 import os
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 
+from palpate._arrays import Float64Array
+from palpate.cutting import Blade
+from palpate.errors import SimulationError
+from palpate.hands import Pull
+from palpate.mesh import Mesh
+from palpate.model import Body, Model, read_model
 from palpate.results.measures import mean_edge, signed_volumes
 from palpate.simulation import Simulation
 
 #: A node deeper than this part of the mean edge inside another body, for as many steps, is stuck.
 DEEP, LASTING = 0.01, 600
+#: What hands do before the next round begins, and how many of these are cuts at most.
+EPISODES, CUTS = 40, 4
+#: Where the probe waits, above everything [m].
+HOME = np.array([0.0, 0.0, 0.5])
+#: Growth that counts: of memory between rounds, and of the median time of a step.
+MORE_MEMORY, MORE_TIME = 1.1, 1.5
 
 
 def memory() -> float:
@@ -27,58 +42,188 @@ def memory() -> float:
     return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
 
 
+def probe(radius: float) -> Mesh:
+    """An octahedron, twice refined, on a sphere [m]."""
+    nodes = [np.array(p, dtype=float) for p in
+             ((1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1))]  # fmt: skip
+    triangles = [(0, 2, 4), (2, 1, 4), (1, 3, 4), (3, 0, 4),
+                 (2, 0, 5), (1, 2, 5), (3, 1, 5), (0, 3, 5)]  # fmt: skip
+    for _ in range(2):
+        middles: dict[tuple[int, int], int] = {}
+
+        def middle(a: int, b: int, known: dict[tuple[int, int], int] = middles) -> int:
+            key = (min(a, b), max(a, b))
+            if key not in known:
+                known[key] = len(nodes)
+                nodes.append((nodes[a] + nodes[b]) / np.linalg.norm(nodes[a] + nodes[b]))
+            return known[key]
+
+        finer = []
+        for a, b, c in triangles:
+            ab, bc, ca = middle(a, b), middle(b, c), middle(c, a)
+            finer += [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
+        triangles = finer
+    return Mesh(radius * np.array(nodes), triangles=triangles)
+
+
+class Soak:
+    """Hands at work on case 2; ``faults`` says what went wrong."""
+
+    def __init__(self, seed: int) -> None:
+        self._random = np.random.default_rng(seed)
+        model = read_model("case2")
+        self._soft = [body.name for body in model.bodies if body.rigid is None]
+        meshes = [body.mesh for body in model.bodies if body.rigid is None]
+        self._edge = float(np.mean([mean_edge(mesh) for mesh in meshes]))
+        ball = probe(1.5 * self._edge)
+        tool = Body(ball.with_nodes(ball.nodes + HOME), name="probe", rigid=())
+        bodies = [*model.bodies, tool]
+        self._simulation = Simulation(
+            Model(bodies, gravity=model.gravity, attachments=model.attachments)
+        )
+        self._tool = self._simulation.tool("probe")
+        self.faults: list[str] = []
+        self.steps = 0
+        self._deepest = 0.0
+        self._deep_since = 0
+        self._cuts = 0
+        self._seconds: list[float] = []
+        #: Of each round: median time of a step [s] and memory at its end [MB].
+        self.rounds: list[tuple[float, float]] = []
+
+    def _step(self, count: int, before: Callable[[int], None] | None = None) -> None:
+        for index in range(count):
+            if before is not None:
+                before(index)
+            start = time.process_time()
+            report = self._simulation.step()
+            self._seconds.append(time.process_time() - start)
+            self.steps += 1
+            depth = report.max_depth / self._edge
+            self._deepest = max(self._deepest, depth)
+            self._deep_since = self._deep_since + 1 if depth > DEEP else 0
+            if self._deep_since == LASTING:
+                self.faults.append(f"step {self.steps}: a node is stuck {depth:.2f} edges deep")
+            if self.steps % 500 == 0:
+                self._tell(depth)
+
+    def _tell(self, depth: float) -> None:
+        places = self._simulation.positions
+        if not all(np.isfinite(x).all() for x in places):
+            self.faults.append(f"step {self.steps}: a position is not finite")
+        inverted = sum(
+            int((signed_volumes(x, body.mesh.tetrahedra) <= 0).sum())
+            for x, body in zip(places, self._simulation.model.bodies, strict=True)
+            if body.rigid is None
+        )
+        print(
+            f"{self.steps} steps, {self._cuts} cuts: deepest {self._deepest:.2f} edges, now "
+            f"{depth:.3f}, {inverted} inverted, {len(self._simulation.intersections())} pairs, "
+            f"{1e3 * float(np.median(self._seconds[-500:])):.1f} ms, {memory():.0f} MB",
+            flush=True,
+        )
+
+    def _node(self) -> tuple[str, int]:
+        name = str(self._random.choice(self._soft))
+        mesh = self._simulation.model.bodies[self._index(name)].mesh
+        return name, int(self._random.choice(mesh.surface_nodes))
+
+    def _index(self, name: str) -> int:
+        return self._simulation.model.body_index(name)
+
+    def _direction(self) -> Float64Array:
+        way: Float64Array = self._random.normal(size=3)
+        return way / float(np.linalg.norm(way))
+
+    def _pull(self) -> None:
+        name, node = self._node()
+        start = self._simulation.positions[self._index(name)][node]
+        target = start + self._random.uniform(0.01, 0.06) * self._direction()
+        stiffness = float(self._random.uniform(2.0, 40.0))
+        pull: Pull = self._simulation.pull(name, node, target, stiffness)
+        self._step(30)
+        if pull.is_active:
+            pull.release()
+
+    def _push(self) -> None:
+        """The probe comes from outside towards a node, goes some edges deep, and leaves."""
+        name, node = self._node()
+        goal = self._simulation.positions[self._index(name)][node]
+        way = self._direction()
+        way[2] = abs(way[2])  # from above
+        outside, inside = goal + 0.08 * way, goal - 2.0 * self._edge * way
+        above = np.array([*outside[:2], HOME[2]])
+        path = [(HOME, above, 1), (above, outside, 20), (outside, inside, 30)]
+        for start, end, count in [*path, *((b, a, n) for a, b, n in reversed(path))]:
+            self._step(count, lambda k: self._place(start + (end - start) * (k + 1) / count))  # noqa: B023
+
+    def _place(self, point: Float64Array) -> None:
+        self._tool.set_pose([1.0, 0.0, 0.0, 0.0], point - HOME)
+
+    def _cut(self) -> None:
+        name, node = self._node()
+        middle = self._simulation.positions[self._index(name)].mean(axis=0)
+        goal = self._simulation.positions[self._index(name)][node]
+        size = float(self._random.uniform(3.0, 8.0)) * self._edge
+        blade = Blade.plane(goal, np.cross(goal - middle, self._direction()), size)
+        self._simulation.cut(blade, min_edge=0.1 * self._edge)
+        self._cuts += 1
+
+    def round(self, end: float) -> None:
+        """Episodes from the start until ``end`` on the clock, at most; then all begins anew."""
+        cuts = 0
+        self._seconds.clear()
+        for _ in range(EPISODES):
+            if time.monotonic() > end:
+                break
+            kind = self._random.random()
+            try:
+                if kind < 0.6:
+                    self._pull()
+                elif kind < 0.85 or cuts == CUTS:
+                    self._push()
+                else:
+                    cuts += 1
+                    self._cut()
+                self._step(30)
+            except SimulationError as error:
+                self.faults.append(f"step {self.steps}: {error}")
+                break
+        median = float(np.median(self._seconds)) if self._seconds else 0.0
+        self._deep_since = 0
+        self._simulation.reset()
+        gc.collect()
+        self.rounds.append((median, memory()))
+
+    def check_growth(self) -> None:
+        """Compare the last rounds with the first ones (but the very first, which fills buffers)."""
+        if len(self.rounds) < 4:
+            return
+        third = max(1, (len(self.rounds) - 1) // 3)
+        first, last = np.array(self.rounds[1 : 1 + third]), np.array(self.rounds[-third - 1 : -1])
+        (time_before, memory_before), (time_after, memory_after) = (
+            np.median(first, axis=0),
+            np.median(last, axis=0),
+        )
+        print(
+            f"rounds at first: {1e3 * time_before:.1f} ms, {memory_before:.0f} MB; "
+            f"at last: {1e3 * time_after:.1f} ms, {memory_after:.0f} MB"
+        )
+        if memory_after > MORE_MEMORY * memory_before:
+            self.faults.append(f"memory grew from {memory_before:.0f} to {memory_after:.0f} MB")
+        if time_after > MORE_TIME * time_before:
+            self.faults.append(f"a step took {time_before:.4f} s and takes {time_after:.4f} s")
+
+
 def soak(minutes: float, seed: int) -> list[str]:
-    """What went wrong; pulls a random node somewhere for half a second, rests now and then."""
-    random = np.random.default_rng(seed)
-    simulation = Simulation("case2")
-    bodies = [body for body in simulation.model.bodies if body.rigid is None]
-    edge = float(np.mean([mean_edge(body.mesh) for body in bodies]))
-    faults: list[str] = []
-    deep_since = steps = 0
-    settled = 0.0
-    deepest = 0.0
-    inverted = 0
+    """What went wrong."""
+    hands = Soak(seed)
     end = time.monotonic() + 60 * minutes
     while time.monotonic() < end:
-        body = bodies[random.integers(len(bodies))]
-        node = int(random.choice(body.mesh.surface_nodes))
-        start = simulation.positions[simulation.model.body_index(body.name)]
-        way = random.normal(size=3)
-        target = start[node] + random.uniform(0.01, 0.06) * way / np.linalg.norm(way)
-        pull = simulation.pull(body.name, node, target, float(random.uniform(2.0, 40.0)))
-        for pulled in (True, False):
-            for _ in range(30):
-                report = simulation.step()
-                steps += 1
-                deepest = max(deepest, report.max_depth / edge)
-                deep_since = deep_since + 1 if report.max_depth > DEEP * edge else 0
-                if deep_since == LASTING:
-                    faults.append(
-                        f"step {steps}: a node is stuck {report.max_depth / edge:.2f} deep"
-                    )
-                if steps == 600:
-                    settled = memory()
-                if steps % 500 == 0:
-                    inverted = sum(
-                        int((signed_volumes(x, each.mesh.tetrahedra) <= 0).sum())
-                        for x, each in zip(simulation.positions, bodies, strict=False)
-                    )
-                    print(
-                        f"{steps} steps: deepest {deepest:.2f} edges, now "
-                        f"{report.max_depth / edge:.3f}, {inverted} inverted, "
-                        f"{len(simulation.intersections())} pairs, {memory():.0f} MB",
-                        flush=True,
-                    )
-            if pulled:
-                pull.release()
-    if settled and memory() > 1.1 * settled:
-        faults.append(f"memory grew from {settled:.0f} to {memory():.0f} MB")
-    if deep_since:
-        print(f"at the end a node has been inside for {deep_since} steps")
-    if inverted:
-        print(f"at the end {inverted} tetrahedra are inverted")
-    print(f"{steps} steps, seed {seed}")
-    return faults
+        hands.round(end)
+    hands.check_growth()
+    print(f"{hands.steps} steps in {len(hands.rounds)} rounds, seed {seed}")
+    return hands.faults
 
 
 if __name__ == "__main__":
