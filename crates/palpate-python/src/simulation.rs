@@ -321,7 +321,7 @@ impl PySimulation {
     }
 
     fn tool_loop(&self, py: Python<'_>, body: usize, margin: Option<f64>) -> PyResult<PyToolLoop> {
-        let made = raise(py, py.detach(|| self.lock().tool_loop(body, margin)))?;
+        let made = raise(py, py.detach(|| self.simulation.lock().tool_loop(body, margin)))?;
         Ok(PyToolLoop { tool_loop: Mutex::new(made) })
     }
 

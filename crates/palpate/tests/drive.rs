@@ -159,3 +159,24 @@ fn what_cannot_be_driven_is_refused_and_changes_nothing() {
     assert!(nan.contains("the target of node 6 of body 0 is not finite"), "{nan}");
     assert!(*simulation.snapshot().state() == before, "an error changes nothing");
 }
+
+#[test]
+fn a_state_with_a_spring_on_a_driven_node_can_be_loaded() {
+    let mut simulation =
+        Simulation::new(held_bar(Law::Linear, 0.05), SimulationOptions::default()).unwrap();
+    let node = far_end()[1];
+    let pull = simulation.pull(0, node as usize, [0.2, 0.0, 0.0], 5.0).unwrap();
+    simulation.drive(0, &[node]).unwrap();
+    simulation.step().unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("state.palpate");
+    simulation.save(&path).unwrap();
+    let mut loaded = Simulation::load(&path, 1).unwrap();
+    for simulation in [&mut simulation, &mut loaded] {
+        let drive = simulation.drives()[0].id;
+        simulation.release_drive(drive).unwrap();
+        simulation.step().unwrap();
+        assert_eq!(simulation.pulls()[0].id, pull);
+    }
+    assert_eq!(loaded.positions(0), simulation.positions(0));
+}

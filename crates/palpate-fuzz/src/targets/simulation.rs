@@ -117,16 +117,7 @@ pub(crate) fn model(choices: &mut Choices) -> Model {
 
 /// All that must not change when a call is refused. As bytes: NaN is not equal to itself.
 fn everything(simulation: &Simulation) -> Result<Vec<u8>, String> {
-    let mut state = simulation.snapshot().state().clone();
-    for body in &mut state.bodies {
-        // What the response to contact was computed for last: a step that fails may have computed it.
-        body.shape.clear();
-    }
-    state_bytes(&state)
-}
-
-fn state_bytes(state: &State) -> Result<Vec<u8>, String> {
-    postcard::to_stdvec(state).map_err(|error| error.to_string())
+    postcard::to_stdvec(simulation.snapshot().state()).map_err(|error| error.to_string())
 }
 
 fn call(

@@ -24,10 +24,14 @@ impl Dynamics {
         stiffness: f64,
     ) -> Result<u64, MechanicsError> {
         self.check_pull(body, node, target, stiffness)?;
+        if !self.body(body).elastic().is_some_and(|elastic| elastic.is_free(node)) {
+            return Err(MechanicsError::CannotMove { body, node });
+        }
         let position = self.positions(body)[node];
         Ok(self.ties.pull((body as u32, node as u32), position, target, stiffness))
     }
 
+    /// Whether a spring can be in a state. Its node need not be free: it may be driven meanwhile.
     pub(super) fn check_pull(
         &self,
         body: usize,
@@ -37,7 +41,7 @@ impl Dynamics {
     ) -> Result<(), MechanicsError> {
         self.check_body(body)?;
         self.check_node(body, node)?;
-        if !self.body(body).elastic().is_some_and(|elastic| elastic.is_free(node)) {
+        if self.body(body).elastic().is_none() {
             return Err(MechanicsError::CannotMove { body, node });
         }
         check_target(target)?;
