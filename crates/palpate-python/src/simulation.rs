@@ -1,6 +1,7 @@
 //! `palpate._core.Simulation`: the step loop, its state and its checkpoints.
 
 use std::path::PathBuf;
+use std::sync::Mutex;
 
 use glam::DQuat;
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2};
