@@ -50,7 +50,7 @@ soak: ## Compare with the double loop on fresh random scenes for MINUTES (10)
 	PALPATE_SOAK=$(or $(MINUTES),10) cargo test --release --locked -p palpate-contact \
 		--test soak --test wide -- --nocapture
 
-soak-mechanics: install ## Pull at the organs of case 2 at random for MINUTES (10)
+soak-mechanics: install ## Pull, push and cut the organs of case 2 at random for MINUTES (10)
 	$(BIN)/python -m palpate.bench.verification.soak $(or $(MINUTES),10) $(SEED)
 
 FUZZ := language seg vtk blade checkpoint scene simulation
