@@ -193,7 +193,15 @@ impl Dynamics {
             places.push((task as u32, tasks[task].len() as u32));
             tasks[task].push(body);
         }
-        let pool = start_threads(options.threads)?;
+        let pool = match options.threads {
+            0 | 1 => None,
+            threads => Some(
+                rayon::ThreadPoolBuilder::new()
+                    .num_threads(threads)
+                    .build()
+                    .map_err(|error| MechanicsError::Threads(error.to_string()))?,
+            ),
+        };
         let surfaces: Vec<Surface> =
             model.bodies.iter().map(|body| Surface::new(&body.mesh)).collect();
         let mut ties = Ties::default();
@@ -471,17 +479,6 @@ impl Dynamics {
         }
     }
 
-    /// Starts the threads anew: a process that was forked has none of its parent's.
-    ///
-    /// # Errors
-    /// If they could not be started.
-    pub fn restart_threads(&mut self) -> Result<(), MechanicsError> {
-        let gone = std::mem::replace(&mut self.pool, start_threads(self.options.threads)?);
-        // Its end would be waited for in vain.
-        std::mem::forget(gone);
-        Ok(())
-    }
-
     fn time_at(&self, step: u64) -> f64 {
         self.start_time + (step - self.start_step) as f64 * self.options.time_step
     }
@@ -738,14 +735,6 @@ fn check_array(
         Some(node) => Err(MechanicsError::NotFinite { body, node, what }),
         None => Ok(()),
     }
-}
-
-fn start_threads(threads: usize) -> Result<Option<rayon::ThreadPool>, MechanicsError> {
-    if threads <= 1 {
-        return Ok(None);
-    }
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-    pool.map(Some).map_err(|error| MechanicsError::Threads(error.to_string()))
 }
 
 /// The task of each body: the bodies of one processor that the model names stay together, and
