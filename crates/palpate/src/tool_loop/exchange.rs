@@ -69,11 +69,7 @@ impl Exchange {
     }
 
     /// Says where the tool is and takes what was published since; true if anything was.
-    pub(crate) fn meet(
-        &self,
-        pose: (DQuat, Point),
-        current: &mut Option<Publication>,
-    ) -> bool {
+    pub(crate) fn meet(&self, pose: (DQuat, Point), current: &mut Option<Publication>) -> bool {
         let mut slots = self.lock();
         slots.pose = Some(pose);
         let Some(fresh) = slots.fresh.take() else { return false };
