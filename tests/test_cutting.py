@@ -139,6 +139,48 @@ def test_blades():
     assert repr(own) == "Blade(3 points, 1 triangles)"
 
 
+def slow_stroke(simulation, steps=40):
+    """A scalpel through the whole body, in steps much shorter than an edge; a step after each."""
+    ys = np.linspace(-0.01, 0.07, steps + 1)
+    edges = np.array([[[0.031, y, -0.1], [0.034, y, 0.2]] for y in ys])
+    for first in range(steps):
+        simulation.cut(palpate.Blade.stroke(edges[first : first + 2]))
+        simulation.step()
+
+
+def test_short_steps_cut_a_body_through(simulation, tmp_path):
+    assert np.diff(np.linspace(-0.01, 0.07, 41)).max() < 0.02 / 9
+    simulation.step(5)
+    start = simulation.snapshot()
+    slow_stroke(simulation)
+    assert len(simulation.model.bodies[0].mesh.pieces()) == 2
+    assert len(simulation.separate()) == 3
+    # The same in two halves, the second from a checkpoint.
+    simulation.restore(start)
+    edges = [[[0.031, y, -0.1], [0.034, y, 0.2]] for y in np.linspace(-0.01, 0.07, 41)]
+    for first in range(40):
+        if first == 17:
+            simulation.save(tmp_path / "half.palpate")
+            simulation = palpate.Simulation.load(tmp_path / "half.palpate")
+        simulation.cut(palpate.Blade.stroke(edges[first : first + 2]))
+        simulation.step()
+    after = simulation.positions[0].tobytes()
+    simulation.restore(start)
+    slow_stroke(simulation)
+    assert simulation.positions[0].tobytes() == after
+
+
+def test_the_smallest_piece_is_the_users_choice(simulation):
+    start = simulation.snapshot()
+    corner = palpate.Blade.plane([0.006, 0.006, 0.009], [1, 1, 1])
+    for asked, count in [(0, 2), (30, 1)]:
+        simulation.restore(start)
+        simulation.cut(corner, min_piece=asked)
+        assert len(simulation.model.bodies[0].mesh.pieces()) == count
+    with pytest.raises(palpate.SimulationError, match="min_piece"):
+        simulation.cut(corner, min_piece=-1)
+
+
 @pytest.mark.parametrize(
     ("make", "error", "words"),
     [

@@ -28,7 +28,7 @@ _Material = tuple[
 ]
 _Contact = tuple[float, float | None, float | None, bool]
 _Key = tuple[float, _Vec3, _Quaternion]
-_CutOptions = tuple[float | None, float | None, float | None]
+_CutOptions = tuple[float | None, float | None, float | None, float | None]
 _Change = tuple["Mesh", _Index, _Float64, _Index]
 _Changes = tuple[list[tuple[int, _Change, dict[str, Any] | None, list[int]]], dict[str, float]]
 _Stats = tuple[float, float, float, int, int, int, int, int, int]

@@ -210,14 +210,22 @@ def as_blade(value: Any) -> Blade:
 
 
 def cut_options(
-    snap: float | None, min_quality: float | None, min_edge: float | None
-) -> tuple[float | None, float | None, float | None]:
+    snap: float | None,
+    min_quality: float | None,
+    min_edge: float | None,
+    min_piece: float | None,
+) -> tuple[float | None, float | None, float | None, float | None]:
     """Options as the core takes them."""
-    named = (("snap", snap), ("min_quality", min_quality), ("min_edge", min_edge))
-    first, second, third = (
-        None if value is None else _arrays.scalar(value, name) for name, value in named
+
+    def number(value: float | None, name: str) -> float | None:
+        return None if value is None else _arrays.scalar(value, name)
+
+    return (
+        number(snap, "snap"),
+        number(min_quality, "min_quality"),
+        number(min_edge, "min_edge"),
+        number(min_piece, "min_piece"),
     )
-    return first, second, third
 
 
 def chosen(tetrahedra: npt.ArrayLike, count: int) -> Sequence[int]:

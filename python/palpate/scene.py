@@ -137,6 +137,7 @@ class Scene:
         snap: float | None = None,
         min_quality: float | None = None,
         min_edge: float | None = None,
+        min_piece: float | None = None,
     ) -> tuple[BodyCut, ...]:
         """Cut bodies of tetrahedra along a blade, where they are now.
 
@@ -150,7 +151,7 @@ class Scene:
             In the space of the positions [m].
         bodies : iterable of int or str, optional
             All bodies with tetrahedra unless given.
-        snap, min_quality, min_edge
+        snap, min_quality, min_edge, min_piece
             As in `Simulation.cut`.
 
         Returns
@@ -162,7 +163,7 @@ class Scene:
         chosen_bodies: list[int] = (
             list(solid) if bodies is None else [body_index(self._names, each) for each in bodies]
         )
-        options = cut_options(snap, min_quality, min_edge)
+        options = cut_options(snap, min_quality, min_edge, min_piece)
         rows = self._core.cut(as_blade(blade)._core, sorted(set(chosen_bodies)), options)
         cuts = tuple(
             BodyCut(body, MeshChange._from_core(change), **report) for body, change, report in rows

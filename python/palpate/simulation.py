@@ -334,12 +334,17 @@ class Simulation:
         snap: float | None = None,
         min_quality: float | None = None,
         min_edge: float | None = None,
+        min_piece: float | None = None,
     ) -> CutReport:
         """Cut all deformable bodies along a blade, where they are now.
 
         The next step goes on with the new surfaces; both lips of the cut touch each other. Node and
         tetrahedron numbers that were there stay; what is new comes after them. `model` and the
         shapes of all arrays are new, fixed nodes, regions and fibres follow.
+
+        A scalpel may move on in steps as short as one likes, frame by frame: what it has reached and
+        not opened yet is remembered (snapshots and checkpoints hold it) until tetrahedra of the
+        body are removed or it is separated.
 
         Parameters
         ----------
@@ -350,7 +355,11 @@ class Simulation:
         min_quality : float
             Smallest radius ratio of the parts of split tetrahedra, 0 to 1.
         min_edge : float
-            Shortest part of a split edge [m]; 0 for no bound.
+            Shortest part of a split edge [m], 0 for no bound; unless given, a tenth of the mean edge
+            that the body had at the start.
+        min_piece : float
+            Smallest piece that comes off, in mean tetrahedra of the mesh: smaller ones stay where
+            they are. 0 for no bound, 4 unless given.
 
         Returns
         -------
@@ -363,7 +372,7 @@ class Simulation:
             If a body cannot be cut or simulated afterwards; nothing has changed then.
         """
         rows, times = self._core.cut(
-            as_blade(blade)._core, cut_options(snap, min_quality, min_edge)
+            as_blade(blade)._core, cut_options(snap, min_quality, min_edge, min_piece)
         )
         if rows:
             self._changed()

@@ -29,9 +29,14 @@ impl IgnoredPairs {
         }
     }
 
+    /// Forgets a body.
+    pub(crate) fn forget(&mut self, body: u32) {
+        self.pairs.retain(|pair| !pair.contains(&body));
+    }
+
     /// Forgets a body; those after it move down by one index.
     pub(crate) fn remove_body(&mut self, removed: u32) {
-        self.pairs.retain(|pair| !pair.contains(&removed));
+        self.forget(removed);
         for body in self.pairs.as_flattened_mut() {
             *body -= u32::from(*body > removed);
         }

@@ -77,7 +77,7 @@ fn step_by_step(mesh: &Mesh) -> Result<(), Box<dyn Error>> {
         let y = center[1] + 0.1 * extent[1] * (9.0 * s).sin();
         [[x, y, center[2] + extent[2]], [x, y, center[2]]]
     };
-    let options = CutOptions { min_edge: 0.1 * mesh.mean_surface_edge(), ..CutOptions::default() };
+    let options = CutOptions::default();
     let (mut now, mut positions, mut pending) = (mesh.clone(), mesh.nodes().to_vec(), Vec::new());
     let (mut opened, mut idle, mut area) = (Vec::new(), Vec::new(), 0.0);
     for k in 0..100 {

@@ -22,17 +22,22 @@ pub struct CutOptions {
     /// whole had: its split is refused instead, and the cut passes through its nodes. In [0, 1].
     pub min_quality: f64,
     /// No part of a split tetrahedron has a shorter edge [m] at rest, unless the whole had. With
-    /// it, no number of cuts makes more than a bounded number of tetrahedra. 0 for no bound; a
-    /// tenth of a mesh's mean edge costs little accuracy.
-    pub min_edge: f64,
+    /// it, no number of cuts makes more than a bounded number of tetrahedra. 0 for no bound; `None`:
+    /// [`CutOptions::EDGE`] of the mean edge of the mesh's surface.
+    pub min_edge: Option<f64>,
     /// No piece comes off that has less volume at rest than this many mean tetrahedra of the mesh:
     /// it stays where it was. 0 for no bound.
     pub min_piece: f64,
 }
 
+impl CutOptions {
+    /// Usual shortest edge, as a part of the mean edge of a mesh's surface: it costs little accuracy.
+    pub const EDGE: f64 = 0.1;
+}
+
 impl Default for CutOptions {
     fn default() -> Self {
-        Self { snap: 0.15, min_quality: 0.1, min_edge: 0.0, min_piece: 4.0 }
+        Self { snap: 0.15, min_quality: 0.1, min_edge: None, min_piece: 4.0 }
     }
 }
 
@@ -143,7 +148,10 @@ fn sheet_by_sheet(
     }
     let volume = mesh.volume();
     let min_volume = options.min_piece * volume / mesh.tetrahedra().len() as f64;
-    let limits = Limits { options: *options, min_volume, keeps_pending };
+    let CutOptions { snap, min_quality, .. } = *options;
+    let min_edge = options.min_edge.unwrap_or_else(|| CutOptions::EDGE * mesh.mean_surface_edge());
+    let shape = ShapeLimits { snap, min_quality, min_edge };
+    let limits = Limits { shape, min_volume, keeps_pending };
     let mut draft = Draft::new(mesh, positions, pending);
     let mut total: Option<SheetCut> = None;
     for sheet in blade.sheets(&bounds) {
@@ -160,11 +168,18 @@ fn sheet_by_sheet(
 
 /// The options, in the units of a mesh.
 struct Limits {
-    options: CutOptions,
+    shape: ShapeLimits,
     /// Smallest volume [m³] of a piece.
     min_volume: f64,
     /// Whether faces that are cut and not opened are of use.
     keeps_pending: bool,
+}
+
+/// What decides whether an edge is split; see [`CutOptions`].
+pub(crate) struct ShapeLimits {
+    pub(crate) snap: f64,
+    pub(crate) min_quality: f64,
+    pub(crate) min_edge: f64,
 }
 
 fn check(mesh: &Mesh, positions: &[Point], options: &CutOptions) -> Result<(), CutError> {
@@ -182,6 +197,7 @@ fn check(mesh: &Mesh, positions: &[Point], options: &CutOptions) -> Result<(), C
         return Err(CutError::NonFinitePosition { node, position: positions[node] });
     }
     let CutOptions { snap, min_quality, min_edge, min_piece } = *options;
+    let min_edge = min_edge.unwrap_or(0.0);
     let ranges = [
         ("snap", snap, (0.0..=0.5).contains(&snap), "in [0, 0.5]"),
         ("min_quality", min_quality, (0.0..=1.0).contains(&min_quality), "in [0, 1]"),
@@ -229,7 +245,7 @@ fn cut_by_sheet<'a>(
     }
     let mut sides = Sides::new(sheet, draft.positions.len());
     let edges = crossed_edges(draft, sheet, &crossing, &mut sides);
-    let plan = snap::plan(draft, &edges, &mut sides, &limits.options);
+    let plan = snap::plan(draft, &edges, &mut sides, &limits.shape);
 
     let mut next = draft.clone();
     let mut is_touched = vec![false; draft.tetrahedra.len()];

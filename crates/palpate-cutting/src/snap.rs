@@ -10,7 +10,7 @@ use std::collections::VecDeque;
 use palpate_geometry::{Point, tetrahedron, vec3};
 
 use crate::crossing::{CrossedEdge, Sides};
-use crate::cut::CutOptions;
+use crate::cut::ShapeLimits;
 use crate::draft::Draft;
 use crate::split::{EdgeSplit, Parts};
 
@@ -62,7 +62,7 @@ pub(crate) fn plan(
     draft: &Draft,
     edges: &[CrossedEdge],
     sides: &mut Sides,
-    options: &CutOptions,
+    options: &ShapeLimits,
 ) -> Plan {
     let mut splits: Vec<Split> = edges.iter().map(|&edge| split_at(draft, edge)).collect();
     let mut snapped = snap_close(draft, &mut splits, sides, options);
@@ -110,7 +110,7 @@ fn snap_close(
     draft: &Draft,
     splits: &mut [Split],
     sides: &mut Sides,
-    options: &CutOptions,
+    options: &ShapeLimits,
 ) -> usize {
     splits.sort_unstable_by(|left, right| {
         let closer_first = left.nearer().0.total_cmp(&right.nearer().0);
@@ -170,7 +170,7 @@ fn snap_slivers(
     splits: &[Split],
     stars: &[Star],
     sides: &mut Sides,
-    options: &CutOptions,
+    options: &ShapeLimits,
 ) -> usize {
     let mut around: Vec<(u32, u32)> = Vec::new();
     for (index, star) in stars.iter().enumerate() {
@@ -207,7 +207,7 @@ fn node_to_snap(
     splits: &[Split],
     star: &Star,
     sides: &Sides,
-    options: &CutOptions,
+    options: &ShapeLimits,
 ) -> Option<u32> {
     let shape = Shape::new(draft, splits, star, options);
     let is_live = |split: &Split| split.edge.nodes.iter().all(|&node| sides.sign(node) != 0);
@@ -246,7 +246,7 @@ struct Shape<'a> {
 }
 
 impl<'a> Shape<'a> {
-    fn new(draft: &Draft, splits: &'a [Split], star: &'a Star, options: &CutOptions) -> Self {
+    fn new(draft: &Draft, splits: &'a [Split], star: &'a Star, options: &ShapeLimits) -> Self {
         let nodes = draft.tetrahedra[star.tetrahedron as usize];
         let mut points = [[0.0; 3]; 10];
         for (corner, node) in nodes.into_iter().enumerate() {

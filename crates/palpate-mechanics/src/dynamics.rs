@@ -175,24 +175,6 @@ impl Dynamics {
         if !(time_step.is_finite() && time_step > 0.0) {
             return Err(MechanicsError::TimeStep(time_step));
         }
-        if !model.gravity.iter().all(|g| g.is_finite()) {
-            return Err(MechanicsError::Gravity);
-        }
-        let mut bodies = Vec::with_capacity(model.bodies.len());
-        let mut parameters = Vec::with_capacity(model.bodies.len());
-        for (index, body) in model.bodies.iter().enumerate() {
-            bodies.push(MovingBody::new(index, body, model.gravity, time_step, known(index))?);
-            parameters.push(ContactParameters::new(index, body)?);
-        }
-        let task_of = assign_tasks(model, options.threads.max(1));
-        let task_count = task_of.iter().max().map_or(0, |last| last + 1);
-        let mut tasks: Vec<Vec<MovingBody>> = Vec::new();
-        tasks.resize_with(task_count, Vec::new);
-        let mut places = Vec::with_capacity(bodies.len());
-        for (body, task) in bodies.into_iter().zip(task_of) {
-            places.push((task as u32, tasks[task].len() as u32));
-            tasks[task].push(body);
-        }
         let pool = match options.threads {
             0 | 1 => None,
             threads => Some(
@@ -202,14 +184,42 @@ impl Dynamics {
                     .map_err(|error| MechanicsError::Threads(error.to_string()))?,
             ),
         };
+        let make = |index: usize| {
+            MovingBody::new(index, &model.bodies[index], model.gravity, time_step, known(index))
+        };
+        Self::with_bodies(model, options, pool, make)
+    }
+
+    /// Of bodies that `make` gives.
+    fn with_bodies(
+        model: &Model,
+        options: DynamicsOptions,
+        pool: Option<rayon::ThreadPool>,
+        mut make: impl FnMut(usize) -> Result<MovingBody, MechanicsError>,
+    ) -> Result<Self, MechanicsError> {
+        if !model.gravity.iter().all(|g| g.is_finite()) {
+            return Err(MechanicsError::Gravity);
+        }
+        let mut bodies = Vec::with_capacity(model.bodies.len());
+        let mut parameters = Vec::with_capacity(model.bodies.len());
+        for (index, body) in model.bodies.iter().enumerate() {
+            bodies.push(make(index)?);
+            parameters.push(ContactParameters::new(index, body)?);
+        }
+        let mut places = Vec::with_capacity(bodies.len());
+        let mut counts = vec![0; options.threads.max(1)];
+        for task in assign_tasks(model, options.threads.max(1)) {
+            places.push((task as u32, counts[task]));
+            counts[task] += 1;
+        }
         let surfaces: Vec<Surface> =
             model.bodies.iter().map(|body| Surface::new(&body.mesh)).collect();
         let mut ties = Ties::default();
         attach(&mut ties, model, &parameters, &surfaces);
-        Ok(Self {
+        let mut dynamics = Self {
             options,
             pool,
-            tasks,
+            tasks: Vec::new(),
             places,
             response: Response::new(ties.attached_nodes()),
             surfaces,
@@ -222,7 +232,27 @@ impl Dynamics {
             predict_time: Duration::ZERO,
             part: 1.0,
             strict: false,
-        })
+        };
+        dynamics.put_bodies(bodies);
+        Ok(dynamics)
+    }
+
+    /// Gives all bodies, by their index, to the tasks that step them.
+    fn put_bodies(&mut self, bodies: impl IntoIterator<Item = MovingBody>) {
+        let count = self.places.iter().map(|place| place.0 as usize + 1).max().unwrap_or(0);
+        self.tasks.clear();
+        self.tasks.resize_with(count, Vec::new);
+        for (body, place) in bodies.into_iter().zip(&self.places) {
+            self.tasks[place.0 as usize].push(body);
+        }
+    }
+
+    /// Takes all bodies, by their index, from their tasks.
+    fn take_bodies(&mut self) -> Vec<MovingBody> {
+        let mut bodies: Vec<MovingBody> =
+            std::mem::take(&mut self.tasks).into_iter().flatten().collect();
+        bodies.sort_unstable_by_key(|body| body.index);
+        bodies
     }
 
     /// How the bodies are stepped.

@@ -99,18 +99,18 @@ pub(crate) fn read_blades(py: Python<'_>, path: PathBuf) -> PyResult<Vec<StrokeR
 }
 
 /// Options that are given, over the usual ones.
-pub(crate) fn options((snap, min_quality, min_edge): Options) -> CutOptions {
+pub(crate) fn options((snap, min_quality, min_edge, min_piece): Options) -> CutOptions {
     let usual = CutOptions::default();
     CutOptions {
         snap: snap.unwrap_or(usual.snap),
         min_quality: min_quality.unwrap_or(usual.min_quality),
-        min_edge: min_edge.unwrap_or(usual.min_edge),
-        ..usual
+        min_edge: min_edge.or(usual.min_edge),
+        min_piece: min_piece.unwrap_or(usual.min_piece),
     }
 }
 
-/// `snap`, `min_quality` and `min_edge`, `None` for the usual one.
-pub(crate) type Options = (Option<f64>, Option<f64>, Option<f64>);
+/// `snap`, `min_quality`, `min_edge` and `min_piece`, `None` for the usual one.
+pub(crate) type Options = (Option<f64>, Option<f64>, Option<f64>, Option<f64>);
 
 /// Mesh, nodes and weights of the origins, parents of the tetrahedra.
 pub(crate) type ChangeColumns<'py> =

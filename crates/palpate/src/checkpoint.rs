@@ -12,7 +12,9 @@ use palpate_model::files::write_whole;
 use palpate_model::{Document, Model};
 use serde::{Deserialize, Serialize};
 
-use crate::simulation::{Simulation, SimulationError, SimulationOptions, Snapshot, Substeps};
+use crate::simulation::{
+    PendingFaces, Simulation, SimulationError, SimulationOptions, Snapshot, Substeps,
+};
 
 const MAGIC: [u8; 8] = *b"palpate\n";
 const VERSION: u32 = 5;
@@ -60,6 +62,8 @@ struct Payload<M, S> {
     initial_model: Option<(M, Option<String>)>,
     initial: S,
     state: S,
+    initial_pending: PendingFaces,
+    pending: PendingFaces,
 }
 
 impl Simulation {
@@ -79,6 +83,8 @@ impl Simulation {
             initial_model: was_cut.then(|| (initial.model.as_ref(), initial.model.to_text())),
             initial: &initial.state,
             state: &now.state,
+            initial_pending: initial.pending.clone(),
+            pending: now.pending,
         };
         let io = |source| CheckpointError::Io { path: path.to_path_buf(), source };
         let bytes = postcard::to_stdvec(&payload)
@@ -117,8 +123,13 @@ impl Simulation {
             substeps: payload.substeps,
         };
         let continued = || {
-            let mut simulation = Simulation::in_state(model, options, payload.state)?;
-            simulation.set_initial(Snapshot { model: initial_model, state: payload.initial });
+            let mut simulation =
+                Simulation::in_state(model, options, payload.state, payload.pending)?;
+            simulation.set_initial(Snapshot {
+                model: initial_model,
+                state: payload.initial,
+                pending: payload.initial_pending,
+            });
             Ok(simulation)
         };
         continued()

@@ -18,6 +18,7 @@ use palpate_mechanics::{
 };
 use palpate_model::{MeshError, Model};
 
+pub(crate) use change::PendingFaces;
 pub use change::{BodyChange, ChangeReport, ChangeTimes, Snapshot};
 use loops::Link;
 use substeps::Finer;
@@ -202,6 +203,7 @@ pub struct Simulation {
     scene: Scene,
     dynamics: Dynamics,
     initial: Snapshot,
+    pending: PendingFaces,
     /// Copy of the last search: the scene's own list is gone when it searches for close pairs.
     penetration: Vec<PenetratingNode>,
     /// For steps that are tried again, once there was one.
@@ -225,14 +227,16 @@ impl Simulation {
         let scene = Scene::new(meshes, Some(&model.structure), scene_options)?;
         let SimulationOptions { time_step, threads, .. } = options;
         let dynamics = Dynamics::new(&model, DynamicsOptions { time_step, threads })?;
-        let initial = Snapshot { model: Arc::clone(&model), state: dynamics.state() };
-        let penetration = Vec::new();
+        let pending = PendingFaces::new();
+        let (state, penetration) = (dynamics.state(), Vec::new());
+        let initial = Snapshot { model: Arc::clone(&model), state, pending: pending.clone() };
         Ok(Self {
             model,
             options,
             scene,
             dynamics,
             initial,
+            pending,
             penetration,
             finer: None,
             loops: Vec::new(),
@@ -382,17 +386,20 @@ impl Simulation {
 
     /// Everything, to come back to with [`Self::restore`].
     pub fn snapshot(&self) -> Snapshot {
-        Snapshot { model: Arc::clone(&self.model), state: self.dynamics.state() }
+        let (model, state) = (Arc::clone(&self.model), self.dynamics.state());
+        Snapshot { model, state, pending: self.pending.clone() }
     }
 
     /// Returns to a snapshot of this simulation; it continues with the same bits. Cuts made since are
-    /// undone, which takes as long as a new simulation.
+    /// undone; bodies that they changed are made anew.
     ///
     /// # Errors
     /// If the state is of another model.
     pub fn restore(&mut self, snapshot: &Snapshot) -> Result<(), SimulationError> {
         if Arc::ptr_eq(&snapshot.model, &self.model) {
-            return Ok(self.dynamics.set_state(&snapshot.state)?);
+            self.dynamics.set_state(&snapshot.state)?;
+            self.pending.clone_from(&snapshot.pending);
+            return Ok(());
         }
         // Cuts leave the bodies there, and only add to them.
         let mut names = snapshot.model.bodies.iter().map(|body| &body.name);
@@ -425,9 +432,10 @@ impl Simulation {
         model: Arc<Model>,
         options: SimulationOptions,
         state: State,
+        pending: PendingFaces,
     ) -> Result<Self, SimulationError> {
         let (scene, dynamics) = change::parts(&model, options, &state)?;
-        let initial = Snapshot { model: Arc::clone(&model), state };
+        let initial = Snapshot { model: Arc::clone(&model), state, pending: pending.clone() };
         let penetration = Vec::new();
         Ok(Self {
             model,
@@ -435,6 +443,7 @@ impl Simulation {
             scene,
             dynamics,
             initial,
+            pending,
             penetration,
             finer: None,
             loops: Vec::new(),

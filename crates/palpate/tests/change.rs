@@ -181,6 +181,86 @@ fn pieces_become_bodies_of_their_own() {
     assert_eq!(simulation.model().bodies.len(), 3);
 }
 
+/// Steps of 2 mm through boxes of 2 cm cells, a time step after each; from the first to before the last.
+fn cut_slowly(simulation: &mut Simulation, steps: std::ops::Range<i32>) {
+    let edge = |step: i32| {
+        let y = -0.005 + 0.002 * f64::from(step);
+        [[0.031, y, -0.1], [0.034, y, 0.3]]
+    };
+    for step in steps {
+        let blade = Blade::stroke(&[edge(step), edge(step + 1)]).unwrap();
+        simulation.cut(&blade, &CutOptions::default()).unwrap();
+        simulation.step().unwrap();
+    }
+}
+
+#[test]
+fn a_scalpel_in_steps_shorter_than_an_edge_leaves_no_bridges() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut simulation = start(Law::NeoHookean);
+    let whole = simulation.snapshot();
+    cut_slowly(&mut simulation, 0..17);
+    let half = simulation.snapshot();
+    let path = folder.path().join("half.palpate");
+    simulation.save(&path).unwrap();
+    cut_slowly(&mut simulation, 17..40);
+    let pieces =
+        |simulation: &Simulation| [0, 1].map(|b| simulation.model().bodies[b].mesh.pieces().len());
+    assert_eq!(pieces(&simulation), [2, 2]);
+    let expected = bits(&simulation);
+
+    // The faces that wait are part of snapshots and checkpoints.
+    let mut loaded = Simulation::load(&path, 1).unwrap();
+    cut_slowly(&mut loaded, 17..40);
+    assert_eq!(bits(&loaded), expected, "from the file");
+    simulation.restore(&half).unwrap();
+    cut_slowly(&mut simulation, 17..40);
+    assert_eq!(bits(&simulation), expected, "from the snapshot");
+    simulation.restore(&whole).unwrap();
+    cut_slowly(&mut simulation, 0..40);
+    assert_eq!(bits(&simulation), expected, "from the start");
+}
+
+#[test]
+fn bodies_that_a_separation_or_an_undo_does_not_change_go_on_as_they_are() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("parts.palpate");
+    let mut simulation = start(Law::NeoHookean);
+    let whole = simulation.snapshot();
+    // Only the lower box comes apart, and the upper one has an order of its own.
+    simulation.remove(1, &[3]).unwrap();
+    let edge = |y: f64| [[0.041, y, -0.1], [0.041, y, 0.044]];
+    cut(&mut simulation, &Blade::stroke(&[edge(-0.1), edge(0.2)]).unwrap());
+    run(&mut simulation, 3);
+    let before = simulation.snapshot();
+    assert_eq!(simulation.separate().unwrap().len(), 4);
+    for (step, body) in [(0, 1), (5, 2)] {
+        assert!(Arc::ptr_eq(
+            &simulation.model().bodies[body].mesh,
+            &before.model().bodies[body].mesh
+        ));
+        run(&mut simulation, step);
+        // One that is made of nothing but the file is the slow twin.
+        simulation.save(&path).unwrap();
+        let mut fresh = Simulation::load(&path, 1).unwrap();
+        assert_eq!(simulation.snapshot().state(), fresh.snapshot().state());
+        let snapshot = simulation.snapshot();
+        let expected = run(&mut fresh, 10);
+        assert_eq!(run(&mut simulation, 10), expected);
+        simulation.restore(&snapshot).unwrap();
+    }
+    for back in [&before, &whole] {
+        simulation.restore(back).unwrap();
+        simulation.save(&path).unwrap();
+        let mut fresh = Simulation::load(&path, 1).unwrap();
+        assert_eq!(run(&mut simulation, 10), run(&mut fresh, 10));
+    }
+    let scene = simulation.scene().unwrap();
+    for body in 0..3 {
+        assert_eq!(scene.tree(body).validate(scene.mesh(body), scene.positions(body)), Ok(()));
+    }
+}
+
 #[test]
 fn the_model_after_cuts_is_written_and_loaded_again() {
     let folder = tempfile::tempdir().unwrap();

@@ -2,11 +2,12 @@
 
 use std::sync::Arc;
 
-use palpate_model::{Mesh, MeshChange};
+use palpate_model::{Mesh, MeshChange, Structure};
 
 use super::{Scene, SceneBody, SceneError};
 use crate::left_out::Groups;
 use crate::surface::Surface;
+use crate::upper_tree::UpperTree;
 
 impl Scene {
     /// Gives a body the mesh that a cut or a removal has made of its own, its nodes where the nodes that
@@ -25,6 +26,37 @@ impl Scene {
         check_change(&self.bodies[body].mesh, change)
             .map_err(|reason| SceneError::OtherMesh { body, reason })?;
         self.bodies[body].change(change);
+        self.bodies_changed();
+        Ok(())
+    }
+
+    /// Goes on with other bodies: those whose mesh is the very one (the same `Arc`) of the body with their
+    /// index stay as they are, with their positions and groups; the others begin at their mesh's
+    /// positions. Pairs of bodies that stay are ignored as before. `structure` as in [`Scene::new`].
+    ///
+    /// # Errors
+    /// If there are no meshes, or the structure does not name each body once; the scene is then unchanged.
+    pub fn exchange(
+        &mut self,
+        meshes: &[Arc<Mesh>],
+        structure: &Structure,
+    ) -> Result<(), SceneError> {
+        if meshes.is_empty() {
+            return Err(SceneError::NoMeshes);
+        }
+        self.upper = UpperTree::from_structure(structure, meshes.len())?;
+        let mut before = std::mem::take(&mut self.bodies).into_iter();
+        for (body, mesh) in meshes.iter().enumerate() {
+            let same = before.next().filter(|before| Arc::ptr_eq(&before.mesh, mesh));
+            if same.is_none() {
+                self.ignored.forget(body as u32);
+            }
+            let new = || SceneBody::new(Arc::clone(mesh), &self.options);
+            self.bodies.push(same.unwrap_or_else(new));
+        }
+        for gone in 0..before.len() {
+            self.ignored.forget((meshes.len() + gone) as u32);
+        }
         self.bodies_changed();
         Ok(())
     }

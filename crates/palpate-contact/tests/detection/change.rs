@@ -108,7 +108,7 @@ fn cuts(changes: usize, seed: u64) {
             continue;
         }
         let blade = some_blade(scene.positions(body), &mut random);
-        let options = CutOptions { min_edge: 0.05, ..CutOptions::default() };
+        let options = CutOptions { min_edge: Some(0.05), ..CutOptions::default() };
         let found = cut(&mesh, scene.positions(body), &blade, &options).expect("a mesh to cut");
         if let Some(found) = found {
             twins.change(body, &found.change);

@@ -93,7 +93,7 @@ fn cuts_that_cannot_be() {
     for (name, options) in [
         ("snap", CutOptions { snap: 0.6, ..options }),
         ("min_quality", CutOptions { min_quality: NAN, ..options }),
-        ("min_edge", CutOptions { min_edge: -1.0, ..options }),
+        ("min_edge", CutOptions { min_edge: Some(-1.0), ..options }),
         ("min_piece", CutOptions { min_piece: f64::INFINITY, ..options }),
     ] {
         let error = cut(&mesh, mesh.nodes(), &blade, &options).unwrap_err();

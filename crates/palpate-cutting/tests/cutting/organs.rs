@@ -12,7 +12,7 @@ use crate::support::{Random, checked_cut};
 fn strokes_and_planes_through_a_kidney() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models/kidney.seg");
     let mesh = read_mesh(&path, &ReadOptions::default()).unwrap().mesh;
-    let options = CutOptions { min_edge: 0.1 * mesh.mean_surface_edge(), ..CutOptions::default() };
+    let options = CutOptions::default();
     let (center, extent) = (mesh.bounds().center(), mesh.bounds().extent());
     let size = vec3::norm(extent);
     let mut random = Random(3);
@@ -52,7 +52,7 @@ fn strokes_and_planes_through_a_kidney() {
 fn a_kidney_cut_step_by_step_opens_as_deep_as_by_one_stroke() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models/kidney.seg");
     let mesh = read_mesh(&path, &ReadOptions::default()).unwrap().mesh;
-    let options = CutOptions { min_edge: 0.1 * mesh.mean_surface_edge(), ..CutOptions::default() };
+    let options = CutOptions::default();
     let (center, extent) = (mesh.bounds().center(), mesh.bounds().extent());
     // From end to end, down to the middle.
     let edge = |k: usize| {

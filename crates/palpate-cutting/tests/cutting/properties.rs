@@ -17,7 +17,7 @@ fn options() -> impl Strategy<Value = CutOptions> {
         |(snap, min_quality, min_edge, min_piece)| CutOptions {
             snap,
             min_quality,
-            min_edge,
+            min_edge: Some(min_edge),
             min_piece,
         },
     )
@@ -135,7 +135,7 @@ proptest! {
         let small = cut_at(&mesh, &edges, &options);
         let edges = edges.map(|edge| edge.map(|point| point.map(|value| factor * value)));
         let large = mesh.with_nodes(scaled(mesh.nodes())).unwrap();
-        let options = CutOptions { min_edge: factor * options.min_edge, ..options };
+        let options = CutOptions { min_edge: options.min_edge.map(|edge| factor * edge), ..options };
         let large = cut_at(&large, &edges, &options);
         prop_assert_eq!(small.is_some(), large.is_some());
         if let (Some(small), Some(large)) = (small, large) {

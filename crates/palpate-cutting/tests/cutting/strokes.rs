@@ -192,7 +192,7 @@ fn a_scalpel_that_opens_what_it_cuts_leaves_two_pieces() {
     for seed in 0..20_u64 {
         let gap = 0.02 * seed as f64;
         let mesh = box_mesh([5, 4, 3], 0.1, seed);
-        let options = CutOptions { min_edge: 0.1, ..CutOptions::default() };
+        let options = CutOptions { min_edge: Some(0.1), ..CutOptions::default() };
         // Steps of a twelfth of a cell, on a line that turns.
         let place = |k: i32| {
             let x = -0.5 + f64::from(k) / 12.0;

@@ -79,7 +79,7 @@ fn random_cuts_leave_meshes() {
 
 #[test]
 fn the_shortest_edge_bounds_what_many_cuts_can_make() {
-    let options = CutOptions { min_edge: 0.3, ..CutOptions::default() };
+    let options = CutOptions { min_edge: Some(0.3), ..CutOptions::default() };
     let mut random = Random(5);
     let mut mesh = box_mesh([3; 3], 0.1, 5);
     let shortest = |mesh: &Mesh| {
@@ -114,7 +114,7 @@ fn as_many_random_cuts_as_asked_for() {
         let options = CutOptions {
             snap,
             min_quality: 0.03 * seed as f64,
-            min_edge: 0.02,
+            min_edge: Some(0.02),
             min_piece: 0.3 * seed as f64,
         };
         cut_often(cuts / 10, 2, seed, &options);

@@ -92,7 +92,7 @@ impl Surface {
         }
     }
 
-    pub(crate) fn mesh(&self) -> &Mesh {
+    pub(crate) fn mesh(&self) -> &Arc<Mesh> {
         &self.mesh
     }
 

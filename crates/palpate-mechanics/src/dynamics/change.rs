@@ -1,9 +1,12 @@
-//! Cuts and removal while the bodies move, and a process that forks.
+//! Cuts, removal and separation while the bodies move, and a process that forks.
+
+use std::sync::Arc;
 
 use palpate_model::{MeshChange, Model};
 use rayon::ThreadPoolBuilder;
 
-use super::{Dynamics, attach};
+use super::{Dynamics, attach, check_orders};
+use crate::body::{Known, MovingBody};
 use crate::contact::{ContactParameters, Surface};
 use crate::error::MechanicsError;
 use crate::state::{BodyState, ContactForce, State};
@@ -64,6 +67,59 @@ impl Dynamics {
         self.set_contact_forces(&contacts);
         self.response.restore(&contacts);
         Ok(released)
+    }
+
+    /// Goes on in a state of another model: bodies with the very mesh (the same `Arc`) of the body with
+    /// their index here, with its fixed nodes and its order of elimination, must be that body and keep its
+    /// matrix; those of the others are made.
+    ///
+    /// # Errors
+    /// As [`Dynamics::with_state`]; nothing has changed then.
+    pub fn exchange(&mut self, model: &Model, state: &State) -> Result<(), MechanicsError> {
+        check_orders(model, state)?;
+        let mut made: Vec<Option<MovingBody>> = Vec::with_capacity(model.bodies.len());
+        for (index, body) in model.bodies.iter().enumerate() {
+            ContactParameters::new(index, body)?;
+            let saved = &state.bodies[index];
+            let known = Known { order: &saved.order, shape: &saved.stiff_shape };
+            let new = || MovingBody::new(index, body, model.gravity, self.options.time_step, known);
+            made.push(if self.keeps(model, state, index) { None } else { Some(new()?) });
+        }
+        let kept: Vec<bool> = made.iter().map(Option::is_none).collect();
+        let mut before: Vec<Option<MovingBody>> =
+            self.take_bodies().into_iter().map(Some).collect();
+        let pool = self.pool.take();
+        let mut next = Self::with_bodies(model, self.options, pool, |index| {
+            let body = made[index].take().or_else(|| before[index].take());
+            Ok(body.expect("made, or there before"))
+        })
+        .expect("every body has been checked");
+        if let Err(error) = next.set_state(state) {
+            self.pool = next.pool.take();
+            for (index, body) in next.take_bodies().into_iter().enumerate() {
+                if kept[index] {
+                    before[index] = Some(body);
+                }
+            }
+            self.put_bodies(before.into_iter().flatten());
+            return Err(error);
+        }
+        *self = next;
+        Ok(())
+    }
+
+    /// Whether a body of another model can keep what it has here.
+    fn keeps(&self, model: &Model, state: &State, index: usize) -> bool {
+        let body = &model.bodies[index];
+        let same_mesh = |surface: &Surface| Arc::ptr_eq(surface.mesh(), &body.mesh);
+        if !self.surfaces.get(index).is_some_and(same_mesh) {
+            return false;
+        }
+        let same_fixed = self.body(index).elastic().is_none_or(|elastic| {
+            let fixed = |node: &u32| !elastic.is_free(*node as usize);
+            (0..body.mesh.nodes().len() as u32).filter(fixed).eq(body.fixed_nodes.iter().copied())
+        });
+        same_fixed && self.body(index).order() == state.bodies[index].order
     }
 }
 

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use palpate_contact::{Scene, SceneOptions};
-use palpate_cutting::{Blade, CutOptions, CutReport, cut};
+use palpate_cutting::{Blade, CutOptions, CutReport, cut_on};
 use palpate_mechanics::{Dynamics, DynamicsOptions, State};
 use palpate_model::{MeshChange, Model};
 
@@ -50,7 +50,12 @@ pub struct ChangeReport {
 pub struct Snapshot {
     pub(crate) model: Arc<Model>,
     pub(crate) state: State,
+    pub(crate) pending: PendingFaces,
 }
+
+/// For each body the faces that a cut has reached and not opened; the next one goes on with them. Bodies
+/// at the end may be missing: they have none.
+pub(crate) type PendingFaces = Vec<Vec<[u32; 3]>>;
 
 impl Snapshot {
     /// The model, with the cuts that had been made.
@@ -68,6 +73,10 @@ impl Simulation {
     /// Cuts all deformable bodies along `blade`, which is in the space where they are now. The next
     /// step goes on with the new surfaces; both lips of the cut touch each other from then on.
     ///
+    /// A blade may come in steps as short as one likes: faces that it reaches without opening them are
+    /// remembered, until the body is changed otherwise. Without `min_edge`, the shortest edge is that
+    /// part of the mean edge that the body had at the start, however often it is cut.
+    ///
     /// # Errors
     /// If a body could not be cut or not be simulated afterwards; nothing has changed then.
     pub fn cut(
@@ -77,19 +86,34 @@ impl Simulation {
     ) -> Result<ChangeReport, SimulationError> {
         let start = Instant::now();
         let mut changes = Vec::new();
+        let mut pending = self.pending.clone();
+        pending.resize(self.model.bodies.len(), Vec::new());
         for (body, described) in self.model.bodies.iter().enumerate() {
             if described.rigid.is_some() {
                 continue;
             }
             let positions = self.dynamics.positions(body);
-            let found = cut(&described.mesh, positions, blade, options)
+            let options = CutOptions { min_edge: Some(self.min_edge(body, options)), ..*options };
+            let found = cut_on(&described.mesh, positions, blade, &pending[body], &options)
                 .map_err(|source| SimulationError::Cut { body, source })?;
             if let Some(found) = found {
+                pending[body] = found.pending;
                 let (change, report) = (found.change, Some(found.report));
                 changes.push(BodyChange { body, change, report, released: Vec::new() });
             }
         }
-        self.apply(changes, start)
+        let report = self.apply(changes, start)?;
+        self.pending = pending;
+        Ok(report)
+    }
+
+    /// Shortest edge [m] of the parts of a body's tetrahedra.
+    fn min_edge(&self, body: usize, options: &CutOptions) -> f64 {
+        options.min_edge.unwrap_or_else(|| {
+            let first = self.initial.model.bodies.get(body);
+            let mesh = &first.unwrap_or(&self.model.bodies[body]).mesh;
+            CutOptions::EDGE * mesh.mean_surface_edge()
+        })
     }
 
     /// Removes tetrahedra of a deformable body, as cautery or resection does.
@@ -111,12 +135,22 @@ impl Simulation {
             .mesh
             .remove(tetrahedra)
             .map_err(|source| SimulationError::Removal { body, source })?;
-        self.apply(vec![BodyChange { body, change, report: None, released: Vec::new() }], start)
+        let change = BodyChange { body, change, report: None, released: Vec::new() };
+        let report = self.apply(vec![change], start)?;
+        self.forget_pending(body);
+        Ok(report)
+    }
+
+    fn forget_pending(&mut self, body: usize) {
+        if let Some(faces) = self.pending.get_mut(body) {
+            faces.clear();
+        }
     }
 
     /// Makes every piece that has come apart a body of its own, in the same state; the largest piece
     /// keeps the body's index and name, the others come last. Returns for each body the one before and what
-    /// became of its mesh; empty when nothing has come apart. Rebuilds trees and factors of all bodies.
+    /// became of its mesh; empty when nothing has come apart. Only bodies that were in pieces get new trees
+    /// and matrices.
     ///
     /// # Errors
     /// If a piece cannot be simulated; nothing has changed then.
@@ -125,7 +159,13 @@ impl Simulation {
             return Ok(Vec::new());
         };
         let state = self.dynamics.state().of_parts(&parts);
-        self.go_on(&Snapshot { model: Arc::new(model), state })?;
+        let mut pending = self.pending.clone();
+        for (body, faces) in pending.iter_mut().enumerate() {
+            if !Arc::ptr_eq(&model.bodies[body].mesh, &self.model.bodies[body].mesh) {
+                faces.clear();
+            }
+        }
+        self.go_on(&Snapshot { model: Arc::new(model), state, pending })?;
         Ok(parts)
     }
 
@@ -165,11 +205,14 @@ impl Simulation {
         Ok(ChangeReport { bodies: changes, times })
     }
 
-    /// Takes over another model and its state.
+    /// Takes over another model and its state; bodies that are the same keep trees and matrices.
     pub(crate) fn go_on(&mut self, snapshot: &Snapshot) -> Result<(), SimulationError> {
-        let (scene, dynamics) = parts(&snapshot.model, self.options, &snapshot.state)?;
-        (self.scene, self.dynamics) = (scene, dynamics);
-        self.model = Arc::clone(&snapshot.model);
+        let model = &snapshot.model;
+        self.dynamics.exchange(model, &snapshot.state)?;
+        let meshes: Vec<_> = model.bodies.iter().map(|body| Arc::clone(&body.mesh)).collect();
+        self.scene.exchange(&meshes, &model.structure)?;
+        self.model = Arc::clone(model);
+        self.pending.clone_from(&snapshot.pending);
         Ok(())
     }
 }
