@@ -1,31 +1,21 @@
 //! The factor of a body's matrix: made once, solved every step.
 
 mod half;
+mod multifrontal;
 mod packed;
 mod real;
-mod scalar_matrix;
-
-use faer::Par;
-use faer::Side;
-use faer::dyn_stack::{MemBuffer, MemStack};
-use faer::linalg::cholesky::llt::factor::LltError;
-use faer::sparse::linalg::cholesky::supernodal::SupernodalLltRef;
-use faer::sparse::linalg::cholesky::{
-    CholeskySymbolicParams, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering,
-    factorize_symbolic_cholesky,
-};
-use faer::sparse::linalg::{SupernodalThreshold, SymbolicSupernodalParams};
+mod supernodes;
 
 use crate::ordering::{NodeOrder, OrderingMethod};
 use crate::{BlockMatrix, BlockPattern};
 pub use half::{HalfSolution, half_products};
 use half::{HalfWorkspace, NODES, Paths};
+use multifrontal::Fronts;
 use packed::{PackedFactor, PackedWorkspace};
-use scalar_matrix::ScalarMatrix;
+use supernodes::Supernodes;
 
-/// Merge supernodes of up to so many columns while so small a part of the merged one is zero.
-const RELAXATION: [(usize, f64); 4] = [(12, 1.0), (32, 0.5), (64, 0.2), (usize::MAX, 0.05)];
-
+/// Columns of its nodes must have 32-bit numbers.
+const MOST_NODES: usize = u32::MAX as usize / 3;
 /// Largest residual of the probe solve, relative to the right-hand side.
 const PROBE_TOLERANCE: f64 = 1e-6;
 /// The same for a factor kept in single precision, and the largest error relative to the solution;
@@ -100,12 +90,10 @@ pub struct Cholesky {
     /// Place of each node in the order.
     places: Vec<u32>,
     paths: Paths,
-    scalar: ScalarMatrix,
-    symbolic: SymbolicCholesky<u32>,
-    values: Vec<f64>,
+    supernodes: Supernodes,
     precision: Precision,
     packed: Packed,
-    scratch: MemBuffer,
+    fronts: Fronts,
 }
 
 /// The factor in the precision that it is solved in.
@@ -183,41 +171,23 @@ impl Cholesky {
     ) -> Result<Self, FactorError> {
         let pattern = std::sync::Arc::clone(matrix.pattern());
         assert_eq!(order.nodes.len(), pattern.node_count(), "an order of this pattern");
-        let scalar = ScalarMatrix::new(&pattern, &order.nodes);
-        // With the identity order faer reads the upper pattern here, whatever the side says, and
-        // wants the lower triangle in the numeric phase.
-        let params = CholeskySymbolicParams {
-            supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
-            supernodal_params: SymbolicSupernodalParams { relax: Some(&RELAXATION) },
-            ..CholeskySymbolicParams::default()
-        };
-        let upper = scalar.upper_pattern(&pattern, &order.nodes);
-        let symbolic = factorize_symbolic_cholesky(
-            upper.as_ref(),
-            Side::Upper,
-            SymmetricOrdering::Identity,
-            params,
-        )
-        .map_err(|_| FactorError::TooLarge { nodes: pattern.node_count() })?;
-        let scratch = MemBuffer::new(
-            symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, faer::Spec::default()),
-        );
-        let values = vec![0.0; symbolic.len_val()];
+        if pattern.node_count() > MOST_NODES || order.factor_entries > u64::from(u32::MAX) {
+            return Err(FactorError::TooLarge { nodes: pattern.node_count() });
+        }
         let mut places = vec![0; order.nodes.len()];
         for (place, &node) in order.nodes.iter().enumerate() {
             places[node as usize] = place as u32;
         }
+        let supernodes = Supernodes::new(&pattern, &order, &places);
         let mut result = Self {
             pattern,
             order,
             places,
             paths: Paths::default(),
-            scalar,
-            symbolic,
-            values,
+            supernodes,
             precision,
             packed: Packed::default(),
-            scratch,
+            fronts: Fronts::default(),
         };
         result.refactor(matrix)?;
         let count = result.order.nodes.len();
@@ -240,30 +210,14 @@ impl Cholesky {
         if self.pattern.node_count() == 0 {
             return Ok(());
         }
-        self.scalar.set_values(matrix, &self.order.nodes);
-        let factored = self.symbolic.factorize_numeric_llt(
-            &mut self.values,
-            self.scalar.lower(),
-            Side::Lower,
-            faer::linalg::cholesky::llt::factor::LltRegularization::default(),
-            Par::Seq,
-            MemStack::new(&mut self.scratch),
-            faer::Spec::default(),
-        );
-        if let Err(LltError::NonPositivePivot { index }) = factored {
-            return Err(self.not_positive(index));
-        }
-        let SymbolicCholeskyRaw::Supernodal(symbolic) = self.symbolic.raw() else {
-            unreachable!("the supernodal form was forced")
-        };
-        let factor = SupernodalLltRef::new(symbolic, &self.values);
         if self.precision == Precision::Single {
             let mut packed = match std::mem::take(&mut self.packed) {
                 Packed::Single(packed) => packed,
                 Packed::Double(_) => PackedFactor::default(),
             };
-            packed.fill(factor);
+            let factored = self.fronts.factor(&self.supernodes, matrix, &mut packed);
             self.packed = Packed::Single(packed);
+            factored.map_err(|place| self.not_positive(place))?;
             let Probe { residual, error } = self.probe(matrix);
             if residual < SINGLE_PROBE_TOLERANCES[0] && error < SINGLE_PROBE_TOLERANCES[1] {
                 return Ok(());
@@ -273,8 +227,9 @@ impl Cholesky {
             Packed::Double(packed) => packed,
             Packed::Single(_) => PackedFactor::default(),
         };
-        packed.fill(factor);
+        let factored = self.fronts.factor(&self.supernodes, matrix, &mut packed);
         self.packed = Packed::Double(packed);
+        factored.map_err(|place| self.not_positive(place))?;
         let Probe { residual, .. } = self.probe(matrix);
         if residual < PROBE_TOLERANCE { Ok(()) } else { Err(FactorError::Inaccurate { residual }) }
     }

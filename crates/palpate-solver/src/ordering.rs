@@ -18,6 +18,8 @@ pub enum OrderingMethod {
     Given,
 }
 
+pub(crate) const NONE: u32 = u32::MAX;
+
 /// An order of elimination for the nodes of a matrix.
 #[derive(Clone, Debug)]
 pub struct NodeOrder {
@@ -29,6 +31,9 @@ pub struct NodeOrder {
     pub factor_entries: u64,
     /// Multiplications and additions of the factorisation.
     pub flops: f64,
+    /// Elimination tree and column counts, by place; [`NONE`] at the root.
+    parents: Vec<u32>,
+    column_counts: Vec<u32>,
 }
 
 /// Adjacency lists without the node itself, each ascending.
@@ -109,9 +114,31 @@ impl NodeOrder {
         Self::finish(&Graph::new(pattern), OrderingMethod::Given, order)
     }
 
+    /// The parent of each place in the elimination tree; [`NONE`] at a root.
+    pub(crate) fn parents(&self) -> &[u32] {
+        &self.parents
+    }
+
+    /// Blocks of the factor in the column of each place, the diagonal one included.
+    pub(crate) fn column_counts(&self) -> &[u32] {
+        &self.column_counts
+    }
+
     fn finish(graph: &Graph, method: OrderingMethod, order: &[u32]) -> Self {
         let tree = EliminationTree::new(graph, order);
-        let nodes = tree.postorder().into_iter().map(|place| order[place as usize]).collect();
+        let postorder = tree.postorder();
+        let mut new_places = vec![NONE; order.len()];
+        for (new, &old) in postorder.iter().enumerate() {
+            new_places[old as usize] = new as u32;
+        }
+        let parent = |&old: &u32| match tree.parent[old as usize] {
+            NONE => NONE,
+            parent => new_places[parent as usize],
+        };
+        let parents = postorder.iter().map(parent).collect();
+        let column_counts =
+            postorder.iter().map(|&old| tree.column_counts()[old as usize]).collect();
+        let nodes = postorder.into_iter().map(|place| order[place as usize]).collect();
         let mut factor_entries = 0;
         let mut flops = 0.0;
         for &count in tree.column_counts() {
@@ -120,6 +147,6 @@ impl NodeOrder {
             factor_entries += 3 * rows - 3;
             flops += (0..3).map(|k| ((rows - k) * (rows - k)) as f64).sum::<f64>();
         }
-        Self { method, nodes, factor_entries, flops }
+        Self { method, nodes, factor_entries, flops, parents, column_counts }
     }
 }

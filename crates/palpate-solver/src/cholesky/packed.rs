@@ -9,10 +9,6 @@
 //! P lies in panels of [`ROWS`] rows, column after column, without the columns that are zero in the
 //! whole panel. A solve is bound by reading it once per pass, so that single precision halves its time.
 
-use faer::linalg::triangular_solve;
-use faer::reborrow::ReborrowMut;
-use faer::sparse::linalg::cholesky::supernodal::SupernodalLltRef;
-use faer::{MatMut, Par};
 use pulp::Simd;
 
 use super::real::Real;
@@ -70,54 +66,53 @@ pub(super) struct PackedWorkspace<T> {
 }
 
 impl<T: Real> PackedFactor<T> {
-    /// Packs a factor in the memory of the last one.
-    pub(super) fn fill(&mut self, factor: SupernodalLltRef<'_, u32, f64>) {
-        self.size = factor.symbolic().nrows();
+    /// Begins a factor of `size` columns in the memory of the last one.
+    pub(super) fn clear(&mut self, size: usize) {
+        self.size = size;
         self.supernodes.clear();
         self.pattern.clear();
         self.panels.clear();
         (self.widest, self.longest) = (0, 0);
-        let mut packed = Vec::new();
-        for index in 0..factor.symbolic().n_supernodes() {
-            let supernode = factor.supernode(index);
-            let values = supernode.val();
-            let (row_count, width) = (values.nrows(), values.ncols());
-            let (top, below) = values.split_at_row(width);
-            packed.clear();
-            packed.resize(row_count * width, 0.0);
-            let columns = MatMut::from_column_major_slice_mut(&mut packed, row_count, width);
-            let (mut inverse, mut product) = columns.split_at_row_mut(width);
-            inverse.rb_mut().diagonal_mut().fill(1.0);
-            triangular_solve::solve_lower_triangular_in_place(top, inverse, Par::Seq);
-            product.copy_from(below);
-            triangular_solve::solve_upper_triangular_in_place(
-                top.transpose(),
-                product.transpose_mut(),
-                Par::Seq,
-            );
-            let pattern_start = self.pattern.len() as u32;
-            let panel_start = self.panels.len() as u32;
-            self.pattern.extend_from_slice(supernode.pattern());
-            for first in (0..row_count).step_by(ROWS) {
-                let last = row_count.min(first + ROWS);
-                for column in packed.chunks_exact(row_count).take(first + ROWS) {
-                    let mut panel = [T::ZERO; ROWS];
-                    for (entry, &value) in panel.iter_mut().zip(&column[first..last]) {
-                        *entry = T::from_f64(value);
-                    }
-                    self.panels.push(panel);
+    }
+
+    /// Adds a supernode whose columns begin with `start`: T^-1 and B T^-1, column after column, B in
+    /// `columns` below a square of the size of T, and the rows of B.
+    pub(super) fn push<F: Real>(
+        &mut self,
+        start: u32,
+        rows: impl Iterator<Item = u32>,
+        inverse: &[F],
+        columns: &[F],
+    ) {
+        let width = inverse.len().isqrt();
+        let row_count = columns.len() / width;
+        let pattern_start = self.pattern.len() as u32;
+        let panel_start = self.panels.len() as u32;
+        self.pattern.extend(rows);
+        for first in (0..row_count).step_by(ROWS) {
+            let last = row_count.min(first + ROWS);
+            let top = first.min(width)..last.min(width);
+            let below = first.max(width).min(last)..last;
+            for column in 0..width.min(first + ROWS) {
+                let mut panel = [T::ZERO; ROWS];
+                let entries = inverse[column * width..][top.clone()]
+                    .iter()
+                    .chain(&columns[column * row_count..][below.clone()]);
+                for (entry, &value) in panel.iter_mut().zip(entries) {
+                    *entry = T::from_f64(value.to_f64());
                 }
+                self.panels.push(panel);
             }
-            self.supernodes.push(Supernode {
-                start: supernode.start() as u32,
-                width: width as u32,
-                pattern_start,
-                pattern_end: self.pattern.len() as u32,
-                panel_start,
-            });
-            self.widest = self.widest.max(width);
-            self.longest = self.longest.max(row_count.next_multiple_of(ROWS));
         }
+        self.supernodes.push(Supernode {
+            start,
+            width: width as u32,
+            pattern_start,
+            pattern_end: self.pattern.len() as u32,
+            panel_start,
+        });
+        self.widest = self.widest.max(width);
+        self.longest = self.longest.max(row_count.next_multiple_of(ROWS));
     }
 
     pub(super) fn bytes(&self) -> usize {

@@ -6,7 +6,7 @@ use pulp::Simd;
 
 /// A floating-point number and its vectors.
 pub(super) trait Real:
-    Copy + Default + PartialEq + Add<Output = Self> + Sub<Output = Self>
+    Copy + Default + PartialEq + Add<Output = Self> + Sub<Output = Self> + faer::traits::RealField
 {
     const ZERO: Self;
 

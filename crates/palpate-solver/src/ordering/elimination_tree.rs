@@ -1,11 +1,9 @@
 //! The elimination tree of a permuted graph, its column counts and its postorder.
 
-use super::Graph;
-
-const NONE: u32 = u32::MAX;
+use super::{Graph, NONE};
 
 pub(super) struct EliminationTree {
-    parent: Vec<u32>,
+    pub(super) parent: Vec<u32>,
     column_counts: Vec<u32>,
 }
 

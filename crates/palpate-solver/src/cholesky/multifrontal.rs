@@ -1,0 +1,239 @@
+//! The numeric factorisation: each supernode is eliminated from a small dense matrix (Duff and Reid 1983).
+//!
+//! The front of a supernode holds its columns of the matrix and what its children have left for it and
+//! for the nodes above. Eliminating its columns leaves a contribution to its parent, on a stack: children
+//! stand before their parents, so that theirs are the last ones there.
+
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::cholesky::llt::factor::{
+    LltError, LltRegularization, cholesky_in_place, cholesky_in_place_scratch,
+};
+use faer::linalg::matmul::triangular::{self, BlockStructure};
+use faer::linalg::triangular_solve;
+use faer::reborrow::ReborrowMut;
+use faer::{Accum, MatMut, Par};
+
+use super::packed::PackedFactor;
+use super::real::Real;
+use super::supernodes::Supernodes;
+use crate::BlockMatrix;
+
+/// Memory for factorisations.
+pub(super) struct Fronts {
+    /// Columns that are eliminated: those of the diagonal block, with all rows.
+    columns: Vec<f64>,
+    /// Contributions that wait for their parent, lower triangles in whole columns, and how long they are
+    /// together.
+    stack: Vec<f64>,
+    used: usize,
+    /// Place of each node among those of the front.
+    places: Vec<u32>,
+    /// Stretches of rows of a child that are next to each other in the front as well: where they begin
+    /// among its own and in the front, and how many.
+    stretches: Vec<[usize; 3]>,
+    scratch: MemBuffer,
+    /// Columns that the scratch memory is enough for.
+    widest: usize,
+}
+
+/// A supernode as it is solved with, in the precision of that: the inverse of the diagonal block's factor,
+/// and the block below times that, below a square.
+struct Finished<T> {
+    inverse: Vec<T>,
+    columns: Vec<T>,
+}
+
+impl Default for Fronts {
+    fn default() -> Self {
+        Self {
+            columns: Vec::new(),
+            stack: Vec::new(),
+            used: 0,
+            places: Vec::new(),
+            stretches: Vec::new(),
+            scratch: MemBuffer::new(scratch(0)),
+            widest: 0,
+        }
+    }
+}
+
+fn scratch(width: usize) -> faer::dyn_stack::StackReq {
+    cholesky_in_place_scratch::<f64>(width, Par::Seq, faer::Spec::default())
+}
+
+impl Fronts {
+    /// Factors a matrix into the memory of the last factor; the column of a pivot that is not positive
+    /// if there is one. All is done in double precision but for what each supernode is turned into when
+    /// it is finished.
+    pub(super) fn factor<T: Real>(
+        &mut self,
+        supernodes: &Supernodes,
+        matrix: &BlockMatrix,
+        factor: &mut PackedFactor<T>,
+    ) -> Result<(), usize> {
+        let mut finished = Finished::<T> { inverse: Vec::new(), columns: Vec::new() };
+        self.used = 0;
+        self.places.resize(matrix.pattern().node_count(), 0);
+        factor.clear(3 * matrix.pattern().node_count());
+        for s in 0..supernodes.count() {
+            let (nodes, rows) = (supernodes.nodes(s), supernodes.rows(s));
+            let first = 3 * nodes.start;
+            self.assemble(supernodes, matrix, s);
+            self.eliminate(3 * nodes.len(), 3 * rows.len()).map_err(|column| first + column)?;
+            finished.take(3 * nodes.len(), &self.columns);
+            let rows = rows.iter().flat_map(|&row| [0, 1, 2].map(|k| 3 * row + k));
+            factor.push(first as u32, rows, &finished.inverse, &finished.columns);
+        }
+        Ok(())
+    }
+
+    /// Puts the front of a supernode together: columns, and the contribution on top of the stack.
+    fn assemble(&mut self, supernodes: &Supernodes, matrix: &BlockMatrix, s: usize) {
+        let (nodes, rows) = (supernodes.nodes(s), supernodes.rows(s));
+        let (width, below) = (3 * nodes.len(), 3 * rows.len());
+        let height = width + below;
+        for (place, node) in nodes.clone().enumerate() {
+            self.places[node] = place as u32;
+        }
+        for (place, &row) in rows.iter().enumerate() {
+            self.places[row as usize] = (nodes.len() + place) as u32;
+        }
+        self.columns.clear();
+        self.columns.resize(height * width, 0.0);
+        for node in nodes.clone() {
+            let first = 3 * (node - nodes.start);
+            for (row, block) in supernodes.column(matrix, node) {
+                let place = 3 * self.places[row as usize] as usize;
+                for k in 0..3 {
+                    let column = &mut self.columns[(first + k) * height + place..][..3];
+                    column.copy_from_slice(&[0, 1, 2].map(|i| block[i][k]));
+                }
+            }
+        }
+        // The children's contributions are the last ones, the last child's on top.
+        let size = |child: u32| (3 * supernodes.rows(child as usize).len()).pow(2);
+        let children = supernodes.children(s);
+        let begin = self.used - children.iter().map(|&child| size(child)).sum::<usize>();
+        let length = self.stack.len().max(self.used + below * below);
+        self.stack.resize(length, 0.0);
+        let (waiting, own) = self.stack.split_at_mut(self.used);
+        let own = &mut own[..below * below];
+        own.fill(0.0);
+        let mut front = Front { width, below, columns: &mut self.columns, contribution: own };
+        let mut waiting = &waiting[begin..];
+        for &child in children {
+            let (contribution, rest) = waiting.split_at(size(child));
+            waiting = rest;
+            let places =
+                supernodes.rows(child as usize).iter().map(|&row| self.places[row as usize]);
+            front.add(contribution, places, &mut self.stretches);
+        }
+        self.stack.copy_within(self.used..self.used + below * below, begin);
+        self.used = begin + below * below;
+    }
+
+    /// Eliminates the columns, which become those of the factor, and completes the contribution.
+    fn eliminate(&mut self, width: usize, below: usize) -> Result<(), usize> {
+        if width > self.widest {
+            self.widest = width;
+            self.scratch = MemBuffer::new(scratch(width));
+        }
+        let columns = MatMut::from_column_major_slice_mut(&mut self.columns, width + below, width);
+        let (mut top, mut bottom) = columns.split_at_row_mut(width);
+        cholesky_in_place(
+            top.rb_mut(),
+            LltRegularization::default(),
+            Par::Seq,
+            MemStack::new(&mut self.scratch),
+            faer::Spec::default(),
+        )
+        .map_err(|LltError::NonPositivePivot { index }| index)?;
+        let transposed = bottom.rb_mut().transpose_mut();
+        triangular_solve::solve_lower_triangular_in_place(top.as_ref(), transposed, Par::Seq);
+        let contribution = &mut self.stack[self.used - below * below..self.used];
+        triangular::matmul(
+            MatMut::from_column_major_slice_mut(contribution, below, below),
+            BlockStructure::TriangularLower,
+            Accum::Add,
+            bottom.as_ref(),
+            BlockStructure::Rectangular,
+            bottom.as_ref().transpose(),
+            BlockStructure::Rectangular,
+            -1.0,
+            Par::Seq,
+        );
+        Ok(())
+    }
+}
+
+impl<T: Real> Finished<T> {
+    /// Takes the columns of the factor.
+    fn take(&mut self, width: usize, columns: &[f64]) {
+        let height = columns.len() / width;
+        self.columns.clear();
+        self.columns.extend(columns.iter().map(|&value| T::from_f64(value)));
+        self.inverse.clear();
+        self.inverse.resize(width * width, T::ZERO);
+        let columns = MatMut::from_column_major_slice_mut(&mut self.columns, height, width);
+        let (top, bottom) = columns.split_at_row_mut(width);
+        let mut inverse = MatMut::from_column_major_slice_mut(&mut self.inverse, width, width);
+        inverse.rb_mut().diagonal_mut().fill(T::from_f64(1.0));
+        triangular_solve::solve_lower_triangular_in_place(top.as_ref(), inverse, Par::Seq);
+        triangular_solve::solve_upper_triangular_in_place(
+            top.as_ref().transpose(),
+            bottom.transpose_mut(),
+            Par::Seq,
+        );
+    }
+}
+
+/// A front that is put together.
+struct Front<'a> {
+    width: usize,
+    below: usize,
+    columns: &'a mut [f64],
+    contribution: &'a mut [f64],
+}
+
+impl Front<'_> {
+    /// Adds a child's contribution, whose nodes are at `places`.
+    fn add(
+        &mut self,
+        contribution: &[f64],
+        places: impl Iterator<Item = u32>,
+        stretches: &mut Vec<[usize; 3]>,
+    ) {
+        let (width, below, height) = (self.width, self.below, self.width + self.below);
+        let mut size = 0;
+        stretches.clear();
+        for place in places {
+            let place = 3 * place as usize;
+            match stretches.last_mut() {
+                // Columns and contribution are apart.
+                Some([_, at, length]) if *at + *length == place && place != width => *length += 3,
+                _ => stretches.push([size, place, 3]),
+            }
+            size += 3;
+        }
+        for (number, &[from, at, length]) in stretches.iter().enumerate() {
+            for column in 0..length {
+                let source = &contribution[(from + column) * size..][..size];
+                let place = at + column;
+                let (target, offset) = if place < width {
+                    (&mut self.columns[place * height..][..height], 0)
+                } else {
+                    (&mut self.contribution[(place - width) * below..][..below], width)
+                };
+                for (index, &[begin, to, length]) in stretches[number..].iter().enumerate() {
+                    // Of the diagonal stretch, the rows from the diagonal block on.
+                    let skip = if index == 0 { column / 3 * 3 } else { 0 };
+                    let target = &mut target[to - offset + skip..][..length - skip];
+                    let source = &source[begin + skip..][..length - skip];
+                    for (sum, value) in target.iter_mut().zip(source) {
+                        *sum += value;
+                    }
+                }
+            }
+        }
+    }
+}

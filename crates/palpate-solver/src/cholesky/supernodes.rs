@@ -1,0 +1,211 @@
+//! Runs of consecutive nodes in the order of elimination that are eliminated together.
+
+use crate::NodeOrder;
+use crate::ordering::NONE;
+use crate::{BlockMatrix, BlockPattern};
+
+/// Merge supernodes of up to so many columns while so small a part of the merged one is zero.
+const RELAXATION: [(u64, f64); 4] = [(12, 1.0), (32, 0.5), (64, 0.2), (u64::MAX, 0.05)];
+
+/// The supernodes of a pattern in an order, children before parents; nodes by their place in the order.
+#[derive(Debug, Default)]
+pub(super) struct Supernodes {
+    /// First node of each, and the number of nodes.
+    begins: Vec<u32>,
+    /// Where the rows of each begin.
+    row_starts: Vec<u32>,
+    /// Nodes below the diagonal block that its columns have entries in, ascending.
+    rows: Vec<u32>,
+    /// Children of each, ascending.
+    child_starts: Vec<u32>,
+    children: Vec<u32>,
+    /// Blocks of the matrix by their column: row, stored block, whether it is used transposed.
+    block_starts: Vec<u32>,
+    blocks: Vec<(u32, u32, bool)>,
+}
+
+/// A supernode that may yet be merged with its parent.
+#[derive(Clone, Copy)]
+struct Run {
+    begin: u32,
+    end: u32,
+    /// Rows below, and zeros among the entries; of scalars.
+    below: u64,
+    zeros: u64,
+}
+
+impl Run {
+    fn width(self) -> u64 {
+        3 * u64::from(self.end - self.begin)
+    }
+
+    /// With the parent that follows it, if not too much of that is zero.
+    fn merged(self, parent: Self) -> Option<Self> {
+        let width = self.width() + parent.width();
+        let new_zeros = (parent.width() + parent.below - self.below) * self.width();
+        let zeros = self.zeros + parent.zeros + new_zeros;
+        let entries = width * (width + 1) / 2 + parent.below * width;
+        let is_good =
+            |&(most, part): &(u64, f64)| width <= most && zeros as f64 <= part * entries as f64;
+        let merged = Self { begin: self.begin, zeros, ..parent };
+        (new_zeros == 0 || RELAXATION.iter().any(is_good)).then_some(merged)
+    }
+}
+
+impl Supernodes {
+    pub(super) fn new(pattern: &BlockPattern, order: &NodeOrder, places: &[u32]) -> Self {
+        let mut result = Self { begins: runs(order), ..Self::default() };
+        result.take_blocks(pattern, places);
+        result.find_rows();
+        result
+    }
+
+    /// Sorts the blocks of the pattern by their column in the order.
+    fn take_blocks(&mut self, pattern: &BlockPattern, places: &[u32]) {
+        let count = pattern.node_count();
+        let blocks = || {
+            (0..count).flat_map(move |col| {
+                let entries = pattern.range(col).zip(pattern.column(col));
+                entries.map(move |(index, &row)| {
+                    let (p, q) = (places[row as usize], places[col]);
+                    (p.min(q), (p.max(q), index as u32, p < q))
+                })
+            })
+        };
+        self.block_starts = vec![0; count + 1];
+        for (col, _) in blocks() {
+            self.block_starts[col as usize + 1] += 1;
+        }
+        for col in 0..count {
+            self.block_starts[col + 1] += self.block_starts[col];
+        }
+        let mut next = self.block_starts.clone();
+        self.blocks = vec![(0, 0, false); pattern.block_count()];
+        for (col, block) in blocks() {
+            self.blocks[next[col as usize] as usize] = block;
+            next[col as usize] += 1;
+        }
+    }
+
+    /// Finds rows and children: the rows of a supernode are those of its matrix columns and of its
+    /// children.
+    fn find_rows(&mut self) {
+        let (count, supernodes) = (self.block_starts.len() - 1, self.count());
+        let mut of_node = vec![0; count];
+        for s in 0..supernodes {
+            of_node[self.nodes(s)].fill(s as u32);
+        }
+        // Lists of children, the last one first.
+        let (mut last_child, mut earlier) = (vec![NONE; supernodes], vec![NONE; supernodes]);
+        let mut seen_by = vec![NONE; count];
+        self.row_starts.push(0);
+        self.child_starts.push(0);
+        for s in 0..supernodes {
+            let nodes = self.nodes(s);
+            let first = self.rows.len();
+            let mut add = |rows: &mut Vec<u32>, row: u32| {
+                if row as usize >= nodes.end && seen_by[row as usize] != s as u32 {
+                    seen_by[row as usize] = s as u32;
+                    rows.push(row);
+                }
+            };
+            for node in nodes.clone() {
+                let blocks = self.block_starts[node] as usize..self.block_starts[node + 1] as usize;
+                for &(row, ..) in &self.blocks[blocks] {
+                    add(&mut self.rows, row);
+                }
+            }
+            let first_child = self.children.len();
+            let mut child = last_child[s];
+            while child != NONE {
+                self.children.push(child);
+                for place in self.row_range(child as usize) {
+                    let row = self.rows[place];
+                    add(&mut self.rows, row);
+                }
+                child = earlier[child as usize];
+            }
+            self.children[first_child..].reverse();
+            self.child_starts.push(self.children.len() as u32);
+            self.rows[first..].sort_unstable();
+            if let Some(&parent) = self.rows.get(first) {
+                let parent = of_node[parent as usize] as usize;
+                earlier[s] = std::mem::replace(&mut last_child[parent], s as u32);
+            }
+            self.row_starts.push(self.rows.len() as u32);
+        }
+    }
+
+    pub(super) fn count(&self) -> usize {
+        self.begins.len() - 1
+    }
+
+    pub(super) fn nodes(&self, s: usize) -> std::ops::Range<usize> {
+        self.begins[s] as usize..self.begins[s + 1] as usize
+    }
+
+    fn row_range(&self, s: usize) -> std::ops::Range<usize> {
+        self.row_starts[s] as usize..self.row_starts[s + 1] as usize
+    }
+
+    pub(super) fn rows(&self, s: usize) -> &[u32] {
+        &self.rows[self.row_range(s)]
+    }
+
+    pub(super) fn children(&self, s: usize) -> &[u32] {
+        &self.children[self.child_starts[s] as usize..self.child_starts[s + 1] as usize]
+    }
+
+    /// The blocks of a matrix of the pattern in the column of a node: the row, and the block with its
+    /// rows along the first index.
+    pub(super) fn column<'a>(
+        &'a self,
+        matrix: &'a BlockMatrix,
+        node: usize,
+    ) -> impl Iterator<Item = (u32, [[f64; 3]; 3])> + 'a {
+        let range = self.block_starts[node] as usize..self.block_starts[node + 1] as usize;
+        self.blocks[range].iter().map(|&(row, index, transposed)| {
+            let block = &matrix.blocks()[index as usize];
+            let entry = |i: usize, k: usize| if transposed { block[k][i] } else { block[i][k] };
+            (row, std::array::from_fn(|i| std::array::from_fn(|k| entry(i, k))))
+        })
+    }
+}
+
+/// First nodes of the supernodes, and the number of nodes.
+fn runs(order: &NodeOrder) -> Vec<u32> {
+    let (parents, counts) = (order.parents(), order.column_counts());
+    let mut child_counts = vec![0_u32; parents.len()];
+    for &parent in parents.iter().filter(|&&parent| parent != NONE) {
+        child_counts[parent as usize] += 1;
+    }
+    let mut runs: Vec<Run> = Vec::new();
+    for node in 0..parents.len() as u32 {
+        let place = node as usize;
+        let below = 3 * u64::from(counts[place] - 1);
+        let continues = place > 0
+            && parents[place - 1] == node
+            && child_counts[place] == 1
+            && counts[place - 1] == counts[place] + 1;
+        if continues && let Some(last) = runs.last_mut() {
+            (last.end, last.below) = (node + 1, below);
+        } else {
+            runs.push(Run { begin: node, end: node + 1, below, zeros: 0 });
+        }
+    }
+    // A run is merged with the one after it when that is its parent.
+    let mut merged: Vec<Run> = Vec::with_capacity(runs.len());
+    for mut run in runs {
+        while let Some(&child) = merged.last() {
+            let parent = parents[child.end as usize - 1];
+            let is_child = (run.begin..run.end).contains(&parent);
+            let Some(both) = Some(child).filter(|_| is_child).and_then(|c| c.merged(run)) else {
+                break;
+            };
+            merged.pop();
+            run = both;
+        }
+        merged.push(run);
+    }
+    merged.iter().map(|run| run.begin).chain([parents.len() as u32]).collect()
+}
