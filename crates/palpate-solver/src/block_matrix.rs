@@ -21,24 +21,73 @@ impl BlockPattern {
     /// # Panics
     /// If a clique names a node that is not below `node_count`.
     pub fn from_cliques<const N: usize>(node_count: usize, cliques: &[[u32; N]]) -> Self {
-        let mut entries: Vec<(u32, u32)> =
-            (0..node_count as u32).map(|node| (node, node)).collect();
+        // Room for all entries of each column, some of them more than once.
+        let mut starts = vec![0_u32; node_count + 1];
+        for col in 0..node_count {
+            starts[col + 1] = 1;
+        }
         for clique in cliques {
             for &row in clique {
                 assert!((row as usize) < node_count, "node {row} of {node_count}");
-                entries.extend(clique.iter().filter(|&&col| col < row).map(|&col| (col, row)));
+                for &col in clique.iter().filter(|&&col| col < row) {
+                    starts[col as usize + 1] += 1;
+                }
             }
         }
-        entries.sort_unstable();
-        entries.dedup();
-        let mut column_starts = vec![0; node_count + 1];
-        for &(col, _) in &entries {
-            column_starts[col as usize + 1] += 1;
-        }
         for col in 0..node_count {
-            column_starts[col + 1] += column_starts[col];
+            starts[col + 1] += starts[col];
         }
-        Self { column_starts, rows: entries.into_iter().map(|(_, row)| row).collect() }
+        let mut rows = vec![0; starts[node_count] as usize];
+        let mut next = starts.clone();
+        let mut push = |col: u32, row: u32| {
+            rows[next[col as usize] as usize] = row;
+            next[col as usize] += 1;
+        };
+        for node in 0..node_count as u32 {
+            push(node, node);
+        }
+        for clique in cliques {
+            for &row in clique {
+                clique.iter().filter(|&&col| col < row).for_each(|&col| push(col, row));
+            }
+        }
+        let mut column_starts = Vec::with_capacity(node_count + 1);
+        column_starts.push(0);
+        let mut kept = 0;
+        for col in 0..node_count {
+            let range = starts[col] as usize..starts[col + 1] as usize;
+            rows[range.clone()].sort_unstable();
+            for place in range.clone() {
+                if place == range.start || rows[place] != rows[kept - 1] {
+                    rows[kept] = rows[place];
+                    kept += 1;
+                }
+            }
+            column_starts.push(kept as u32);
+        }
+        rows.truncate(kept);
+        rows.shrink_to_fit();
+        Self { column_starts, rows }
+    }
+
+    /// The pattern of the nodes that `places` gives a place, which must be ascending, and for each of its
+    /// blocks the one here; others have [`u32::MAX`].
+    ///
+    /// # Panics
+    /// If there is not one place per node.
+    pub fn restricted(&self, places: &[u32]) -> (Self, Vec<u32>) {
+        assert_eq!(places.len(), self.node_count(), "one place per node");
+        let (mut column_starts, mut rows, mut sources) = (vec![0], Vec::new(), Vec::new());
+        for col in (0..self.node_count()).filter(|&col| places[col] != u32::MAX) {
+            for (index, &row) in self.range(col).zip(self.column(col)) {
+                if places[row as usize] != u32::MAX {
+                    rows.push(places[row as usize]);
+                    sources.push(index as u32);
+                }
+            }
+            column_starts.push(rows.len() as u32);
+        }
+        (Self { column_starts, rows }, sources)
     }
 
     /// Number of nodes; the matrix has three times as many rows.

@@ -1,6 +1,7 @@
 //! The sparse solve against a dense factorisation of the same matrix.
 
 #![allow(clippy::needless_range_loop)] // matrices read best by row and column
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use palpate_solver::{
@@ -120,6 +121,20 @@ proptest! {
         DenseCholesky::default().solve_in_place(&mut to_dense(&matrix), &mut expected).unwrap();
         prop_assert!(largest_difference(sparse.as_flattened(), &expected) < 1e-12);
 
+        // Bad orders make other trees.
+        let stride = [1, 7, 11, 13].into_iter().rfind(|step| node_count % step != 0).unwrap_or(1);
+        let order: Vec<u32> =
+            (0..node_count).map(|place| (place * stride % node_count) as u32).collect();
+        let order = NodeOrder::given(matrix.pattern(), &order);
+        for precision in [Precision::Double, Precision::Single] {
+            let other = Cholesky::in_order(&matrix, precision, order.clone()).unwrap();
+            let mut found = rhs.clone();
+            other.solve_in_place(&mut found, &mut other.workspace());
+            let limit = if precision == Precision::Double { 1e-12 } else { 1e-5 };
+            let size = expected.iter().fold(1e-300, |most: f64, x| most.max(x.abs()));
+            prop_assert!(largest_difference(found.as_flattened(), &expected) < limit * size.max(1.0));
+        }
+
         let mut first = rhs.clone();
         let mut second: Vec<[f64; 3]> = rhs.iter().map(|&[x, y, z]| [z, x, -y]).collect();
         let mut expected = second.clone();
@@ -166,6 +181,46 @@ proptest! {
                 }
             }
         }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    #[test]
+    fn patterns_hold_the_pairs_of_their_cliques(
+        node_count in 1_usize..30,
+        cliques in prop::collection::vec(prop::array::uniform4(0_u32..30), 0..60),
+        left_out in prop::collection::vec(any::<bool>(), 30),
+    ) {
+        let cliques: Vec<[u32; 4]> =
+            cliques.into_iter().map(|c| c.map(|node| node % node_count as u32)).collect();
+        let pattern = BlockPattern::from_cliques(node_count, &cliques);
+        let mut pairs: BTreeSet<(u32, u32)> = (0..node_count as u32).map(|i| (i, i)).collect();
+        for clique in &cliques {
+            for &a in clique {
+                pairs.extend(clique.iter().map(|&b| (a.min(b), a.max(b))));
+            }
+        }
+        let blocks = |pattern: &BlockPattern| -> Vec<(u32, u32)> {
+            let columns = 0..pattern.node_count();
+            columns.flat_map(|c| pattern.column(c).iter().map(move |&r| (c as u32, r))).collect()
+        };
+        prop_assert_eq!(blocks(&pattern), pairs.iter().copied().collect::<Vec<_>>());
+
+        let kept: Vec<u32> = (0..node_count as u32).filter(|&i| !left_out[i as usize]).collect();
+        let mut places = vec![u32::MAX; node_count];
+        for (place, &node) in kept.iter().enumerate() {
+            places[node as usize] = place as u32;
+        }
+        let (small, sources) = pattern.restricted(&places);
+        prop_assert_eq!(small.node_count(), kept.len());
+        let all = blocks(&pattern);
+        let found: Vec<(u32, u32)> = sources.iter().map(|&block| all[block as usize]).collect();
+        let expected = blocks(&small).into_iter().map(|(c, r)| (kept[c as usize], kept[r as usize]));
+        prop_assert_eq!(found, expected.collect::<Vec<_>>());
+        let whole = |&(c, r): &(u32, u32)| places[c as usize].max(places[r as usize]) != u32::MAX;
+        prop_assert_eq!(small.block_count(), pairs.iter().filter(|pair| whole(pair)).count());
     }
 }
 

@@ -1,11 +1,13 @@
 """A long cut through a kidney of case 2 at rest: how long each frame takes, and where it goes.
 
 A scalpel moves on by a little before every frame; a frame is the cut and the step of 1/60 s. The
-frames before the cut are the usual ones.
+frames before the cut are the usual ones. Afterwards detection with the trees that were kept is compared with
+that of the same simulation loaded from a checkpoint, whose trees are new.
 """
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -55,6 +57,9 @@ class Outcome:
     usual: Spread
     #: By stage; ``frame`` is all of it.
     while_cutting: dict[str, Spread]
+    #: Median seconds of refit and traversal after the cuts, by method: with the trees that were kept, and
+    #: with new ones.
+    kept_and_new: dict[str, tuple[float, float]]
 
 
 def run(
@@ -78,10 +83,13 @@ def run(
         advance()
     before = len(simulation.model.bodies[index].mesh.tetrahedra)
     edges = _edges(simulation.positions[index], frames)
+    strokes = [Blade.stroke(edges[frame : frame + 2]) for frame in range(frames)]
+    paper = Simulation(model, threads=threads, method="paper")
+    paper.restore(simulation.snapshot())
     seconds: dict[str, list[float]] = {stage: [] for stage in STAGES}
     opened = 0
-    for frame in range(frames):
-        cut = simulation.cut(Blade.stroke(edges[frame : frame + 2]))
+    for stroke in strokes:
+        cut = simulation.cut(stroke)
         step = simulation.step().times["total"]
         opened += len(cut) > 0
         for stage in STAGES[:3]:
@@ -90,6 +98,13 @@ def run(
         seconds["frame"].append(cut.times["total"] + step)
         advance()
     after = len(simulation.model.bodies[index].mesh.tetrahedra)
+    for stroke in strokes:
+        paper.cut(stroke)
+        paper.step()
+    kept_and_new = {
+        "wide": _detection(simulation, threads),
+        "paper": _detection(paper, threads),
+    }
     outcome = Outcome(
         model=name,
         body=body,
@@ -99,6 +114,7 @@ def run(
         tetrahedra=(before, after),
         usual=Spread.of(usual),
         while_cutting={stage: Spread.of(values) for stage, values in seconds.items()},
+        kept_and_new=kept_and_new,
     )
     if output is not None:
         output.mkdir(parents=True, exist_ok=True)
@@ -110,6 +126,28 @@ def run(
         write_csv(output / "cutting.csv", lines)
         write_text(output / "report.md", *_report(outcome))
     return outcome
+
+
+def _detection(simulation: Simulation, threads: int) -> tuple[float, float]:
+    """Median seconds of refit and traversal in the next steps: with the trees as they are, with new ones."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "cut.palpate"
+        simulation.save(path)
+        new = Simulation.load(path, threads=threads)
+    seconds: tuple[list[float], list[float]] = ([], [])
+    for _ in range(60):
+        for each, own in zip((simulation, new), seconds, strict=True):
+            times = each.step().times
+            own.append(times["update"] + times["proximity"] + times["penetration"])
+    return float(np.median(seconds[0])), float(np.median(seconds[1]))
+
+
+def trees(outcome: Outcome) -> list[list[str]]:
+    """Method, refit and traversal with the kept trees and with new ones, and their ratio, in words."""
+    return [
+        [name, milliseconds(kept), milliseconds(new), f"{kept / new:.2f}"]
+        for name, (kept, new) in outcome.kept_and_new.items()
+    ]
 
 
 def rows(outcome: Outcome) -> list[list[str]]:
@@ -124,14 +162,18 @@ def rows(outcome: Outcome) -> list[list[str]]:
 #: Of the rows.
 HEADINGS = "stage<|median ms|99 %|worst"
 
+#: Of the trees.
+TREES = "detection after the cuts<|kept trees ms|new trees|ratio"
 
-def _report(outcome: Outcome) -> tuple[str, str, str]:
+
+def _report(outcome: Outcome) -> tuple[str, ...]:
     before, after = outcome.tetrahedra
     return (
         f"# A long cut through {outcome.body} of {outcome.model}",
         f"{outcome.frames} frames of 1/60 s, {outcome.opened} of them open something; {before} "
         f"tetrahedra become {after}; {outcome.threads} threads.",
         markdown_table(HEADINGS, rows(outcome)),
+        markdown_table(TREES, trees(outcome)),
     )
 
 

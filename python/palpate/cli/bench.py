@@ -381,6 +381,7 @@ def bench_cutting(
         print_json({"output": str(output), **asdict(outcome)})
         return
     console().print(table("Frames of 1/60 s", cutting.HEADINGS, cutting.rows(outcome)))
+    console().print(table("Refit and traversal", cutting.TREES, cutting.trees(outcome)))
     _tell(output)
 
 

@@ -2,7 +2,8 @@
 //!
 //! The front of a supernode holds its columns of the matrix and what its children have left for it and
 //! for the nodes above. Eliminating its columns leaves a contribution to its parent, on a stack: children
-//! stand before their parents, so that theirs are the last ones there.
+//! stand before their parents, so that theirs are the last ones there. There are two stacks, for generations
+//! by turns, so that a contribution is put together where it stays while those of the children are read.
 
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::factor::{
@@ -22,10 +23,8 @@ use crate::BlockMatrix;
 pub(super) struct Fronts {
     /// Columns that are eliminated: those of the diagonal block, with all rows.
     columns: Vec<f64>,
-    /// Contributions that wait for their parent, lower triangles in whole columns, and how long they are
-    /// together.
-    stack: Vec<f64>,
-    used: usize,
+    /// Contributions that wait for their parent, lower triangles in whole columns.
+    stacks: [Stack; 2],
     /// Place of each node among those of the front.
     places: Vec<u32>,
     /// Stretches of rows of a child that are next to each other in the front as well: where they begin
@@ -34,6 +33,33 @@ pub(super) struct Fronts {
     scratch: MemBuffer,
     /// Columns that the scratch memory is enough for.
     widest: usize,
+}
+
+/// Contributions, the last one on top; memory beyond those is kept.
+#[derive(Default)]
+struct Stack {
+    values: Vec<f64>,
+    used: usize,
+}
+
+impl Stack {
+    fn push(&mut self, size: usize) {
+        self.used += size;
+        if self.values.len() < self.used {
+            self.values.resize(self.used, 0.0);
+        }
+    }
+
+    /// Takes the last `size` values off.
+    fn pop(&mut self, size: usize) -> &[f64] {
+        let end = self.used;
+        self.used -= size;
+        &self.values[self.used..end]
+    }
+
+    fn top(&mut self, size: usize) -> &mut [f64] {
+        &mut self.values[self.used - size..self.used]
+    }
 }
 
 /// A supernode as it is solved with, in the precision of that: the inverse of the diagonal block's factor,
@@ -47,8 +73,7 @@ impl Default for Fronts {
     fn default() -> Self {
         Self {
             columns: Vec::new(),
-            stack: Vec::new(),
-            used: 0,
+            stacks: [Stack::default(), Stack::default()],
             places: Vec::new(),
             stretches: Vec::new(),
             scratch: MemBuffer::new(scratch(0)),
@@ -72,14 +97,19 @@ impl Fronts {
         factor: &mut PackedFactor<T>,
     ) -> Result<(), usize> {
         let mut finished = Finished::<T> { inverse: Vec::new(), columns: Vec::new() };
-        self.used = 0;
+        for stack in &mut self.stacks {
+            stack.used = 0;
+        }
         self.places.resize(matrix.pattern().node_count(), 0);
         factor.clear(3 * matrix.pattern().node_count());
         for s in 0..supernodes.count() {
             let (nodes, rows) = (supernodes.nodes(s), supernodes.rows(s));
             let first = 3 * nodes.start;
             self.assemble(supernodes, matrix, s);
-            self.eliminate(3 * nodes.len(), 3 * rows.len()).map_err(|column| first + column)?;
+            let contribution = &mut self.stacks[supernodes.generation(s) % 2];
+            let contribution = contribution.top((3 * rows.len()).pow(2));
+            eliminate(&mut self.columns, contribution, 3 * nodes.len(), &mut self.scratch)
+                .map_err(|column| first + column)?;
             finished.take(3 * nodes.len(), &self.columns);
             let rows = rows.iter().flat_map(|&row| [0, 1, 2].map(|k| 3 * row + k));
             factor.push(first as u32, rows, &finished.inverse, &finished.columns);
@@ -110,60 +140,65 @@ impl Fronts {
                 }
             }
         }
-        // The children's contributions are the last ones, the last child's on top.
+        let [even, odd] = &mut self.stacks;
+        let [own, others] =
+            if supernodes.generation(s) % 2 == 0 { [even, odd] } else { [odd, even] };
+        own.push(below * below);
+        let contribution = own.top(below * below);
+        for (place, column) in contribution.chunks_exact_mut(below.max(1)).enumerate() {
+            column[place / 3 * 3..].fill(0.0);
+        }
+        let mut front = Front { width, below, columns: &mut self.columns, contribution };
         let size = |child: u32| (3 * supernodes.rows(child as usize).len()).pow(2);
         let children = supernodes.children(s);
-        let begin = self.used - children.iter().map(|&child| size(child)).sum::<usize>();
-        let length = self.stack.len().max(self.used + below * below);
-        self.stack.resize(length, 0.0);
-        let (waiting, own) = self.stack.split_at_mut(self.used);
-        let own = &mut own[..below * below];
-        own.fill(0.0);
-        let mut front = Front { width, below, columns: &mut self.columns, contribution: own };
-        let mut waiting = &waiting[begin..];
+        let mut waiting = others.pop(children.iter().map(|&child| size(child)).sum());
         for &child in children {
             let (contribution, rest) = waiting.split_at(size(child));
             waiting = rest;
-            let places =
-                supernodes.rows(child as usize).iter().map(|&row| self.places[row as usize]);
+            let rows = supernodes.rows(child as usize).iter();
+            let places = rows.map(|&row| self.places[row as usize]);
             front.add(contribution, places, &mut self.stretches);
         }
-        self.stack.copy_within(self.used..self.used + below * below, begin);
-        self.used = begin + below * below;
-    }
-
-    /// Eliminates the columns, which become those of the factor, and completes the contribution.
-    fn eliminate(&mut self, width: usize, below: usize) -> Result<(), usize> {
         if width > self.widest {
             self.widest = width;
             self.scratch = MemBuffer::new(scratch(width));
         }
-        let columns = MatMut::from_column_major_slice_mut(&mut self.columns, width + below, width);
-        let (mut top, mut bottom) = columns.split_at_row_mut(width);
-        cholesky_in_place(
-            top.rb_mut(),
-            LltRegularization::default(),
-            Par::Seq,
-            MemStack::new(&mut self.scratch),
-            faer::Spec::default(),
-        )
-        .map_err(|LltError::NonPositivePivot { index }| index)?;
-        let transposed = bottom.rb_mut().transpose_mut();
-        triangular_solve::solve_lower_triangular_in_place(top.as_ref(), transposed, Par::Seq);
-        let contribution = &mut self.stack[self.used - below * below..self.used];
-        triangular::matmul(
-            MatMut::from_column_major_slice_mut(contribution, below, below),
-            BlockStructure::TriangularLower,
-            Accum::Add,
-            bottom.as_ref(),
-            BlockStructure::Rectangular,
-            bottom.as_ref().transpose(),
-            BlockStructure::Rectangular,
-            -1.0,
-            Par::Seq,
-        );
-        Ok(())
     }
+}
+
+/// Eliminates the columns, which become those of the factor, and completes the contribution.
+fn eliminate(
+    columns: &mut [f64],
+    contribution: &mut [f64],
+    width: usize,
+    scratch: &mut MemBuffer,
+) -> Result<(), usize> {
+    let height = columns.len() / width;
+    let below = height - width;
+    let columns = MatMut::from_column_major_slice_mut(columns, height, width);
+    let (mut top, mut bottom) = columns.split_at_row_mut(width);
+    cholesky_in_place(
+        top.rb_mut(),
+        LltRegularization::default(),
+        Par::Seq,
+        MemStack::new(scratch),
+        faer::Spec::default(),
+    )
+    .map_err(|LltError::NonPositivePivot { index }| index)?;
+    let transposed = bottom.rb_mut().transpose_mut();
+    triangular_solve::solve_lower_triangular_in_place(top.as_ref(), transposed, Par::Seq);
+    triangular::matmul(
+        MatMut::from_column_major_slice_mut(contribution, below, below),
+        BlockStructure::TriangularLower,
+        Accum::Add,
+        bottom.as_ref(),
+        BlockStructure::Rectangular,
+        bottom.as_ref().transpose(),
+        BlockStructure::Rectangular,
+        -1.0,
+        Par::Seq,
+    );
+    Ok(())
 }
 
 impl<T: Real> Finished<T> {

@@ -19,6 +19,8 @@ pub(super) struct Supernodes {
     /// Children of each, ascending.
     child_starts: Vec<u32>,
     children: Vec<u32>,
+    /// Supernodes above each.
+    generations: Vec<u32>,
     /// Blocks of the matrix by their column: row, stored block, whether it is used transposed.
     block_starts: Vec<u32>,
     blocks: Vec<(u32, u32, bool)>,
@@ -134,6 +136,12 @@ impl Supernodes {
             }
             self.row_starts.push(self.rows.len() as u32);
         }
+        self.generations = vec![0; supernodes];
+        for s in (0..supernodes).rev() {
+            if let Some(&row) = self.rows(s).first() {
+                self.generations[s] = self.generations[of_node[row as usize] as usize] + 1;
+            }
+        }
     }
 
     pub(super) fn count(&self) -> usize {
@@ -154,6 +162,11 @@ impl Supernodes {
 
     pub(super) fn children(&self, s: usize) -> &[u32] {
         &self.children[self.child_starts[s] as usize..self.child_starts[s + 1] as usize]
+    }
+
+    /// How many supernodes are above.
+    pub(super) fn generation(&self, s: usize) -> usize {
+        self.generations[s] as usize
     }
 
     /// The blocks of a matrix of the pattern in the column of a node: the row, and the block with its

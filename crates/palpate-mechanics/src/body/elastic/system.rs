@@ -58,26 +58,24 @@ pub(super) struct SystemMatrix {
 impl SystemMatrix {
     pub(super) fn new(stiffness: &BlockMatrix, free_index: &[u32]) -> Self {
         let pattern = stiffness.pattern();
-        let mut entries: Vec<([u32; 2], u32, Option<u32>)> = Vec::new();
-        for col in 0..free_index.len() as u32 {
-            for &row in pattern.column(col as usize) {
-                let places = [free_index[col as usize], free_index[row as usize]];
-                if !places.contains(&FIXED) {
-                    let source = pattern.find(row, col).expect("taken from the pattern") as u32;
-                    entries.push((places, source, (row == col).then_some(col)));
-                }
-            }
+        let nodes: Vec<u32> = (0..)
+            .zip(free_index)
+            .filter(|(_, place)| **place != FIXED)
+            .map(|(node, _)| node)
+            .collect();
+        let (free, blocks) = if nodes.len() == free_index.len() {
+            (Arc::clone(pattern), (0..pattern.block_count() as u32).collect())
+        } else {
+            let (free, blocks) = pattern.restricted(free_index);
+            (Arc::new(free), blocks)
+        };
+        let mut sources: Vec<(u32, Option<u32>)> =
+            blocks.into_iter().map(|block| (block, None)).collect();
+        for (col, &node) in nodes.iter().enumerate() {
+            let diagonal = free.find(col as u32, col as u32).expect("every node has one");
+            sources[diagonal].1 = Some(node);
         }
-        let edges: Vec<[u32; 2]> = entries.iter().map(|entry| entry.0).collect();
-        let free_count = free_index.iter().filter(|&&place| place != FIXED).count();
-        let matrix = BlockMatrix::zeros(Arc::new(BlockPattern::from_cliques(free_count, &edges)));
-        // Free nodes keep their order, so that no block is transposed.
-        let mut sources = vec![(0, None); matrix.blocks().len()];
-        for ([col, row], source, node) in entries {
-            let place = matrix.pattern().find(row, col).expect("joined above");
-            sources[place] = (source, node);
-        }
-        Self { matrix, sources }
+        Self { matrix: BlockMatrix::zeros(free), sources }
     }
 
     pub(super) fn into_matrix(self) -> BlockMatrix {
