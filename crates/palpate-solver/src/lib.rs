@@ -1,8 +1,8 @@
 //! Sparse Cholesky for elastic bodies: order, factor, solve.
 //!
 //! Matrices are symmetric positive definite with one 3x3 block per pair of nodes that share an
-//! element. The fill-reducing order is found on the node graph, faer factors supernode by supernode
-//! on the calling thread, and solving allocates nothing.
+//! element. Order and structure are found on the node graph, supernodes are factored front by front with the
+//! dense kernels of faer on the calling thread, and solving allocates nothing.
 
 pub mod block_matrix;
 pub mod cholesky;

@@ -77,12 +77,12 @@ impl<T: Real> PackedFactor<T> {
 
     /// Adds a supernode whose columns begin with `start`: T^-1 and B T^-1, column after column, B in
     /// `columns` below a square of the size of T, and the rows of B.
-    pub(super) fn push<F: Real>(
+    pub(super) fn push(
         &mut self,
         start: u32,
         rows: impl Iterator<Item = u32>,
-        inverse: &[F],
-        columns: &[F],
+        inverse: &[T],
+        columns: &[T],
     ) {
         let width = inverse.len().isqrt();
         let row_count = columns.len() / width;
@@ -95,12 +95,9 @@ impl<T: Real> PackedFactor<T> {
             let below = first.max(width).min(last)..last;
             for column in 0..width.min(first + ROWS) {
                 let mut panel = [T::ZERO; ROWS];
-                let entries = inverse[column * width..][top.clone()]
-                    .iter()
-                    .chain(&columns[column * row_count..][below.clone()]);
-                for (entry, &value) in panel.iter_mut().zip(entries) {
-                    *entry = T::from_f64(value.to_f64());
-                }
+                let (upper, lower) = panel[..last - first].split_at_mut(top.len());
+                upper.copy_from_slice(&inverse[column * width..][top.clone()]);
+                lower.copy_from_slice(&columns[column * row_count..][below.clone()]);
                 self.panels.push(panel);
             }
         }
