@@ -379,5 +379,7 @@ def test_cutting_measures_a_long_cut(tmp_path):
     assert results["tetrahedra"][1] > results["tetrahedra"][0]
     for spread in [results["usual"], *results["while_cutting"].values()]:
         assert 0 <= spread["median"] <= spread["p99"] <= spread["worst"]
+    assert set(results["kept_and_new"]) == {"wide", "paper"}
+    assert all(min(both) > 0 for both in results["kept_and_new"].values())
     assert len(rows(tmp_path / "cutting.csv")) == 6
     assert "| frame |" in (tmp_path / "report.md").read_text()

@@ -342,8 +342,8 @@ class Simulation:
         tetrahedron numbers that were there stay; what is new comes after them. `model` and the
         shapes of all arrays are new, fixed nodes, regions and fibres follow.
 
-        A scalpel may move on in steps as short as one likes, frame by frame: what it has reached and
-        not opened yet is remembered (snapshots and checkpoints hold it) until tetrahedra of the
+        A scalpel may move on in steps as short as one likes, frame by frame: what it has reached
+        and not opened yet is remembered (snapshots and checkpoints hold it) until tetrahedra of the
         body are removed or it is separated.
 
         Parameters
@@ -355,8 +355,8 @@ class Simulation:
         min_quality : float
             Smallest radius ratio of the parts of split tetrahedra, 0 to 1.
         min_edge : float
-            Shortest part of a split edge [m], 0 for no bound; unless given, a tenth of the mean edge
-            that the body had at the start.
+            Shortest part of a split edge [m], 0 for no bound; unless given, a tenth of the mean
+            edge that the body had at the start.
         min_piece : float
             Smallest piece that comes off, in mean tetrahedra of the mesh: smaller ones stay where
             they are. 0 for no bound, 4 unless given.

@@ -1,8 +1,8 @@
 """A long cut through a kidney of case 2 at rest: how long each frame takes, and where it goes.
 
 A scalpel moves on by a little before every frame; a frame is the cut and the step of 1/60 s. The
-frames before the cut are the usual ones. Afterwards detection with the trees that were kept is compared with
-that of the same simulation loaded from a checkpoint, whose trees are new.
+frames before the cut are the usual ones. Afterwards detection with the trees that were kept is
+compared with that of the same simulation loaded from a checkpoint, whose trees are new.
 """
 
 from __future__ import annotations
@@ -57,8 +57,8 @@ class Outcome:
     usual: Spread
     #: By stage; ``frame`` is all of it.
     while_cutting: dict[str, Spread]
-    #: Median seconds of refit and traversal after the cuts, by method: with the trees that were kept, and
-    #: with new ones.
+    #: Median seconds of refit and traversal after the cuts, by method: with the trees that were
+    #: kept, and with new ones.
     kept_and_new: dict[str, tuple[float, float]]
 
 
@@ -129,7 +129,7 @@ def run(
 
 
 def _detection(simulation: Simulation, threads: int) -> tuple[float, float]:
-    """Median seconds of refit and traversal in the next steps: with the trees as they are, with new ones."""
+    """Median seconds of refit and traversal in the next steps, with the trees kept and new ones."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "cut.palpate"
         simulation.save(path)
@@ -143,7 +143,7 @@ def _detection(simulation: Simulation, threads: int) -> tuple[float, float]:
 
 
 def trees(outcome: Outcome) -> list[list[str]]:
-    """Method, refit and traversal with the kept trees and with new ones, and their ratio, in words."""
+    """Method, refit and traversal with the kept trees and with new ones, their ratio, in words."""
     return [
         [name, milliseconds(kept), milliseconds(new), f"{kept / new:.2f}"]
         for name, (kept, new) in outcome.kept_and_new.items()

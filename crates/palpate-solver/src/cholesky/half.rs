@@ -274,7 +274,7 @@ impl<T: Real> pulp::WithSimd for HalfPass<'_, T> {
             for (&row, value) in factor.pattern[supernode.pattern()].iter().zip(rows_below) {
                 let x = &mut work.x[row as usize][..padded];
                 for (x, &value) in x.iter_mut().zip(value) {
-                    *x = *x - value;
+                    *x -= value;
                 }
             }
         }

@@ -134,15 +134,14 @@ impl Fronts {
             let first = 3 * (node - nodes.start);
             for (row, block) in supernodes.column(matrix, node) {
                 let place = 3 * self.places[row as usize] as usize;
-                for k in 0..3 {
-                    let column = &mut self.columns[(first + k) * height + place..][..3];
-                    column.copy_from_slice(&[0, 1, 2].map(|i| block[i][k]));
+                for (k, entries) in block.into_iter().enumerate() {
+                    self.columns[(first + k) * height + place..][..3].copy_from_slice(&entries);
                 }
             }
         }
         let [even, odd] = &mut self.stacks;
         let [own, others] =
-            if supernodes.generation(s) % 2 == 0 { [even, odd] } else { [odd, even] };
+            if supernodes.generation(s).is_multiple_of(2) { [even, odd] } else { [odd, even] };
         own.push(below * below);
         let contribution = own.top(below * below);
         for (place, column) in contribution.chunks_exact_mut(below.max(1)).enumerate() {

@@ -212,7 +212,7 @@ impl<T: Real> PackedFactor<T> {
             for (&row, value) in self.pattern[supernode.pattern()].iter().zip(rows_below) {
                 for k in 0..K {
                     let x = &mut x[row as usize][k];
-                    *x = *x - value[k];
+                    *x -= value[k];
                 }
             }
         }

@@ -169,8 +169,8 @@ impl Supernodes {
         self.generations[s] as usize
     }
 
-    /// The blocks of a matrix of the pattern in the column of a node: the row, and the block with its
-    /// rows along the first index.
+    /// The blocks of a matrix of the pattern in the column of a node: the row, and the block column by
+    /// column.
     pub(super) fn column<'a>(
         &'a self,
         matrix: &'a BlockMatrix,
@@ -180,7 +180,7 @@ impl Supernodes {
         self.blocks[range].iter().map(|&(row, index, transposed)| {
             let block = &matrix.blocks()[index as usize];
             let entry = |i: usize, k: usize| if transposed { block[k][i] } else { block[i][k] };
-            (row, std::array::from_fn(|i| std::array::from_fn(|k| entry(i, k))))
+            (row, std::array::from_fn(|k| std::array::from_fn(|i| entry(i, k))))
         })
     }
 }
