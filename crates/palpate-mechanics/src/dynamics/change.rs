@@ -75,6 +75,9 @@ impl Dynamics {
     ///
     /// # Errors
     /// As [`Dynamics::with_state`]; nothing has changed then.
+    ///
+    /// # Panics
+    /// Never: what could fail is tried before anything is given up.
     pub fn exchange(&mut self, model: &Model, state: &State) -> Result<(), MechanicsError> {
         check_orders(model, state)?;
         let mut made: Vec<Option<MovingBody>> = Vec::with_capacity(model.bodies.len());
