@@ -185,7 +185,7 @@ const LAWS: [Law; 6] = [
 ];
 
 const DETECTION: u64 = 0x4b71_fb88_6a72_ebea;
-const CUTS: u64 = 0xa3f8_31f7_4ab7_1d53;
+const CUTS: u64 = 0x8d83_c722_5f31_509a;
 
 #[test]
 fn detection_has_the_committed_bits_at_any_number_of_threads() {

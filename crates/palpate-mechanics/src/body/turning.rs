@@ -56,6 +56,18 @@ impl Rotations {
         &self.arms
     }
 
+    /// Mean of displacements, and the turn in them.
+    pub(super) fn rigid_part(&self, masses: &[f64], values: &[[f64; 3]]) -> (DVec3, DVec3) {
+        let (mut mass, mut mean, mut moment) = (0.0, DVec3::ZERO, DVec3::ZERO);
+        for ((&m, r), &d) in masses.iter().zip(&self.arms).zip(values) {
+            let d = DVec3::from_array(d);
+            mass += m;
+            mean += m * d;
+            moment += m * r.cross(d);
+        }
+        (mean / mass, self.inverse_inertia * moment)
+    }
+
     /// Takes the inertial loads of the turn out of `loads`; returns their torque.
     pub(super) fn balance(&self, masses: &[f64], loads: &mut [[f64; 3]]) -> DVec3 {
         let pairs = self.arms.iter().zip(&*loads);

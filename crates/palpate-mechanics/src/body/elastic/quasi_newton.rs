@@ -40,6 +40,10 @@ const DEFORMED: f64 = 0.1;
 const OVERSHOT: f64 = 0.5;
 const MAX_SHORTENED: usize = 6;
 const SHORTEST: f64 = 0.1;
+/// Farthest that a node goes by deformation before the first iteration, in mean edges.
+const FARTHEST_START: f64 = 0.5;
+/// Farthest that the response to contact moves a node by deformation at a time, in mean edges.
+const LONGEST_RESPONSE: f64 = 2.0;
 /// Farthest that a node moves in an iteration, in mean edges.
 const LONGEST_MOVE: f64 = 1.0;
 
@@ -136,6 +140,11 @@ impl QuasiNewton {
         let to_frame = frame.transpose();
         self.stiff_arms.extend(shape.iter().map(|&x| to_frame * (DVec3::from_array(x) - center)));
         self.system_of_arms(masses, inertia, time_step)
+    }
+
+    /// Farthest that the response to contact may move a node by deformation [m].
+    pub(super) fn longest_response(&self) -> f64 {
+        LONGEST_RESPONSE * self.mean_edge
     }
 
     /// Finds the internal forces at the end of the step that has begun.
@@ -238,13 +247,21 @@ impl ElasticBody {
         contact: Option<&[Point]>,
     ) {
         method.tissue.begin_step(x, self.time_step);
-        self.step.correction.fill([0.0; 3]);
+        self.begin_correction(method.mean_edge);
         method.iterations = 0;
         (method.effort, method.passes) = (0, 1);
         self.relax(method, forces, contact);
         if self.is_unattached() {
             self.put_momentum_right(x, forces, contact);
         }
+    }
+
+    /// Begins where the body would be if it went on with its deformation, or only with a part of it where
+    /// that is large: far beyond its shape a stiff body has forces from which iterations do not come back.
+    fn begin_correction(&mut self, mean_edge: f64) {
+        let way = self.time_step * self.step.fastest_deformation();
+        let less = (1.0 - FARTHEST_START * mean_edge / way).max(0.0) * self.time_step;
+        self.step.begin_correction(less, &self.free_nodes);
     }
 
     /// Iterates from the present correction, with care while contact forces are held.

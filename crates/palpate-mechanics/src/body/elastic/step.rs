@@ -89,6 +89,22 @@ impl Step {
         self.center
     }
 
+    /// Begins with a correction that takes the deformation of the last `less` seconds back.
+    pub(super) fn begin_correction(&mut self, less: f64, free_nodes: &[u32]) {
+        self.correction.fill([0.0; 3]);
+        if less > 0.0 {
+            for (d, &node) in self.correction.iter_mut().zip(free_nodes) {
+                *d = (-less * self.deformation[node as usize]).to_array();
+            }
+        }
+    }
+
+    /// Largest velocity of the deformation at a node [m/s].
+    pub(super) fn fastest_deformation(&self) -> f64 {
+        let squares = self.deformation.iter().map(|v| v.length_squared());
+        squares.fold(0.0, f64::max).sqrt()
+    }
+
     /// Velocity of the deformation at a node, in the frame [m/s].
     pub(super) fn deformation(&self, node: usize) -> DVec3 {
         self.deformation[node]
@@ -307,7 +323,34 @@ impl ElasticBody {
         let mut response = std::mem::take(&mut self.step.response);
         self.load(&mut response, change);
         self.respond_to(&mut response);
+        if let Elasticity::Nonlinear(method) = &self.elasticity {
+            self.limit(&mut response, method.longest_response());
+        }
         self.step.response = response;
+    }
+
+    /// Shortens a response whose deformation moves a node farther than `longest` [m]: there A says nothing
+    /// about a nonlinear body any more, and iterations would not come back. The motion as a whole stays.
+    fn limit(&self, response: &mut [[f64; 3]], longest: f64) {
+        let (mut mean, mut turn) = (DVec3::ZERO, DVec3::ZERO);
+        let unattached = self.is_unattached();
+        if unattached {
+            (mean, turn) = self.step.rotations.rigid_part(&self.masses, response);
+        }
+        let arms = self.step.rotations.arms();
+        let rigid = |node: u32| {
+            if unattached { mean + turn.cross(arms[node as usize]) } else { DVec3::ZERO }
+        };
+        let deformations =
+            self.free_nodes.iter().zip(&*response).map(|(&node, &d)| DVec3::from(d) - rigid(node));
+        let largest = deformations.map(|d| d.length_squared()).fold(0.0, f64::max).sqrt();
+        if largest > longest {
+            let part = longest / largest;
+            for (&node, d) in self.free_nodes.iter().zip(response) {
+                let rigid = rigid(node);
+                *d = (rigid + part * (DVec3::from(*d) - rigid)).to_array();
+            }
+        }
     }
 
     /// Improves the step under contact forces that are not those that it was predicted with; true if
