@@ -292,6 +292,19 @@ impl Cholesky {
         solve!(self, workspace, solve_in_place, rhs);
     }
 
+    /// Solves for two right-hand sides in place; reads the factor once for both. No allocation.
+    ///
+    /// # Panics
+    /// As [`Cholesky::solve_in_place`].
+    pub fn solve_two_in_place(
+        &self,
+        first: &mut [[f64; 3]],
+        second: &mut [[f64; 3]],
+        workspace: &mut SolveWorkspace,
+    ) {
+        solve!(self, workspace, solve_two_in_place, first, second);
+    }
+
     /// Solves for three right-hand sides in place, entry `3 * side + k` of each node being
     /// component k of one; reads the factor once for all. No allocation.
     ///

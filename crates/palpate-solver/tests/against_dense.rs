@@ -135,6 +135,14 @@ proptest! {
             prop_assert!(largest_difference(found.as_flattened(), &expected) < limit * size.max(1.0));
         }
 
+        let mut first = rhs.clone();
+        let mut second: Vec<[f64; 3]> = rhs.iter().map(|&[x, y, z]| [z, x, -y]).collect();
+        let mut expected = second.clone();
+        factor.solve_in_place(&mut expected, &mut workspace);
+        factor.solve_two_in_place(&mut first, &mut second, &mut workspace);
+        prop_assert!(largest_difference(first.as_flattened(), sparse.as_flattened()) < 1e-12);
+        prop_assert!(largest_difference(second.as_flattened(), expected.as_flattened()) < 1e-12);
+
         let mut sides: Vec<[f64; 9]> = rhs.iter().map(|&r| three_sides(r)).collect();
         factor.solve_three_in_place(&mut sides, &mut workspace);
         for side in 0..3 {

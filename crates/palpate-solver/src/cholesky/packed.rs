@@ -145,6 +145,26 @@ impl<T: Real> PackedFactor<T> {
         }
     }
 
+    pub(super) fn solve_two_in_place(
+        &self,
+        order: &[u32],
+        first: &mut [[f64; 3]],
+        second: &mut [[f64; 3]],
+        work: &mut PackedWorkspace<T>,
+    ) {
+        assert!(first.len() == order.len() && second.len() == order.len(), "one entry per node");
+        self.fit(work);
+        for (x, &node) in work.x.as_chunks_mut::<6>().0.iter_mut().zip(order) {
+            let sides = [&first[node as usize], &second[node as usize]];
+            *x = std::array::from_fn(|entry| T::from_f64(sides[entry % 2][entry / 2]));
+        }
+        pulp::Arch::new().dispatch(Passes::<T, 2> { factor: self, work });
+        for (x, &node) in work.x.as_chunks::<6>().0.iter().zip(order) {
+            first[node as usize] = std::array::from_fn(|axis| x[2 * axis].to_f64());
+            second[node as usize] = std::array::from_fn(|axis| x[2 * axis + 1].to_f64());
+        }
+    }
+
     pub(super) fn solve_three_in_place(
         &self,
         order: &[u32],
