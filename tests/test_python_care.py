@@ -156,7 +156,7 @@ LONG_CALLS = {
 def test_other_threads_run_on_while_the_core_works(name: str) -> None:
     """A thread that asks for the lock again and again never waits for the whole call."""
     cells = (9, 9, 9)
-    points = np.random.default_rng(0).random((40_000, 3))
+    points = np.random.default_rng(0).random((80_000, 3))
     scene = palpate.Scene([box(cells), box(cells, origin=(0.31, 0.27, 0.23))], method="all-pairs")
     simulation = palpate.Simulation([box((12, 12, 12), size=0.1)])
     done = threading.Event()

@@ -77,7 +77,8 @@ def test_stress_is_the_closed_form(law):
 def test_nothing_depends_on_the_direction(law):
     rotation = responses.turned([1, 2, 3], 2.5)
     found = responses.rotation_invariance(tissue(law, 0.4, 0.01), rotation)
-    assert found.energy < 1e-8
+    # Forces are read through a factor in single precision.
+    assert found.energy < 5e-8
     assert found.positions < 1e-9
 
 

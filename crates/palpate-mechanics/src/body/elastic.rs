@@ -238,24 +238,44 @@ impl ElasticBody {
         (place != FIXED).then_some(place as usize)
     }
 
-    /// Turns loads on the free nodes into displacements, A^-1. An unattached body is moved as a whole by
-    /// what its mass says, in double precision, and only the rest is solved for.
-    fn solve(&mut self, values: &mut [[f64; 3]]) {
-        if !self.is_unattached() {
-            self.factor.solve_in_place(values, &mut self.step.workspace);
-            return;
-        }
-        let load: DVec3 = values.iter().map(|&value| DVec3::from_array(value)).sum();
-        let acceleration = load / self.mass;
-        for (&m, value) in self.masses.iter().zip(&mut *values) {
-            *value = (DVec3::from_array(*value) - m * acceleration).to_array();
-        }
-        self.factor.solve_in_place(values, &mut self.step.workspace);
-        let moments = self.masses.iter().zip(&*values);
-        let moment: DVec3 = moments.map(|(&m, &value)| m * DVec3::from_array(value)).sum();
-        let shift = self.gain() * acceleration - moment / self.mass;
-        for value in values {
-            *value = (DVec3::from_array(*value) + shift).to_array();
+    /// Turns loads on the free nodes into displacements, A^-1, for one or two cases. An unattached body
+    /// is moved as a whole by what its mass says, in double precision, and only the rest is solved for.
+    fn solve(&mut self, first: &mut [[f64; 3]], second: Option<&mut [[f64; 3]]>) {
+        let unattached = self.is_unattached();
+        let mass = self.mass;
+        let gain = self.gain();
+        let masses = &self.masses;
+        let without_mean = |values: &mut [[f64; 3]]| {
+            let load: DVec3 = values.iter().map(|&value| DVec3::from_array(value)).sum();
+            let acceleration = load / mass;
+            for (&m, value) in masses.iter().zip(values) {
+                *value = (DVec3::from_array(*value) - m * acceleration).to_array();
+            }
+            acceleration
+        };
+        let with_mean = |values: &mut [[f64; 3]], acceleration: DVec3| {
+            let moments = masses.iter().zip(&*values);
+            let moment: DVec3 = moments.map(|(&m, &value)| m * DVec3::from_array(value)).sum();
+            let shift = gain * acceleration - moment / mass;
+            for value in values {
+                *value = (DVec3::from_array(*value) + shift).to_array();
+            }
+        };
+        let workspace = &mut self.step.workspace;
+        match (second, unattached) {
+            (None, false) => self.factor.solve_in_place(first, workspace),
+            (None, true) => {
+                let mean = without_mean(first);
+                self.factor.solve_in_place(first, workspace);
+                with_mean(first, mean);
+            }
+            (Some(second), false) => self.factor.solve_two_in_place(first, second, workspace),
+            (Some(second), true) => {
+                let means = [without_mean(first), without_mean(second)];
+                self.factor.solve_two_in_place(first, second, workspace);
+                with_mean(first, means[0]);
+                with_mean(second, means[1]);
+            }
         }
     }
 

@@ -28,6 +28,8 @@ pub(super) struct Step {
     pub(super) force: Vec<[f64; 3]>,
     /// Correction of the free nodes in the frame [m].
     pub(super) correction: Vec<[f64; 3]>,
+    /// Response of the free nodes in the frame to the contact forces that are expected [m].
+    expected: Vec<[f64; 3]>,
     /// Response to the change of contact forces [m].
     pub(super) response: Vec<[f64; 3]>,
     /// Rotations of the predicted positions of an unattached body.
@@ -71,6 +73,7 @@ impl Step {
             strain: vec![[0.0; 3]; node_count],
             force: vec![[0.0; 3]; node_count],
             correction: vec![[0.0; 3]; free_count],
+            expected: vec![[0.0; 3]; free_count],
             response: vec![[0.0; 3]; free_count],
             rotations: Rotations::default(),
             turns: false,
@@ -154,7 +157,7 @@ impl ElasticBody {
         self.elasticity = elasticity;
     }
 
-    /// Finds the correction with the linear law, the response to the expected contact forces included.
+    /// Finds the correction with the linear law, and the response to the expected contact forces.
     fn correct_linear(
         &mut self,
         stiffness: &BlockMatrix,
@@ -164,23 +167,19 @@ impl ElasticBody {
     ) {
         self.load_elastic(stiffness, forces);
         let mut correction = std::mem::take(&mut self.step.correction);
-        let mut torque = DVec3::ZERO;
+        let mut expected = std::mem::take(&mut self.step.expected);
         if let Some(contact) = contact {
-            // Zero at the start of a step: memory for loads.
-            let mut expected = std::mem::take(&mut self.step.response);
             self.load(&mut expected, contact);
-            torque = self.balance(&mut expected);
-            for (sum, load) in correction.iter_mut().zip(&mut expected) {
-                *sum = std::array::from_fn(|k| sum[k] + load[k]);
-                *load = [0.0; 3];
-            }
-            self.step.response = expected;
+            let torque = self.balance(&mut expected);
+            self.solve(&mut correction, Some(&mut expected));
+            self.turn(torque, &mut expected);
+        } else {
+            expected.fill([0.0; 3]);
+            self.solve(&mut correction, None);
         }
-        self.solve(&mut correction);
-        self.step.correction = correction;
+        (self.step.correction, self.step.expected) = (correction, expected);
         if self.is_unattached() {
-            let turned = self.step.frame * (self.gain() / self.time_step * torque);
-            self.remove_torque(self.next_spin(x, forces, &[]) + turned);
+            self.remove_torque(self.next_spin(x, forces, &[]));
         }
     }
 
@@ -374,7 +373,7 @@ impl ElasticBody {
     /// by what its inertia says.
     pub(super) fn respond_to(&mut self, loads: &mut [[f64; 3]]) {
         let torque = self.balance(loads);
-        self.solve(loads);
+        self.solve(loads, None);
         self.turn(torque, loads);
     }
 
@@ -399,9 +398,10 @@ impl ElasticBody {
     /// Displacement of the free nodes from the prediction.
     pub(super) fn corrections(&self) -> impl Iterator<Item = (usize, DVec3)> {
         let step = &self.step;
-        let parts = step.correction.iter().zip(&step.response);
-        self.free_nodes.iter().zip(parts).map(|(&node, (&a, &b))| {
-            (node as usize, step.frame * (DVec3::from_array(a) + DVec3::from_array(b)))
+        let parts = step.correction.iter().zip(&step.expected).zip(&step.response);
+        self.free_nodes.iter().zip(parts).map(|(&node, ((&a, &b), &c))| {
+            let sum = DVec3::from_array(a) + DVec3::from_array(b) + DVec3::from_array(c);
+            (node as usize, step.frame * sum)
         })
     }
 
