@@ -342,7 +342,7 @@ impl ElasticBody {
         };
         let deformations =
             self.free_nodes.iter().zip(&*response).map(|(&node, &d)| DVec3::from(d) - rigid(node));
-        let largest = deformations.map(|d| d.length_squared()).fold(0.0, f64::max).sqrt();
+        let largest = deformations.map(DVec3::length_squared).fold(0.0, f64::max).sqrt();
         if largest > longest {
             let part = longest / largest;
             for (&node, d) in self.free_nodes.iter().zip(response) {
