@@ -27,6 +27,8 @@ from palpate.simulation import Simulation
 
 #: A node deeper than this part of the mean edge inside another body, for as many steps, is stuck.
 DEEP, LASTING = 0.01, 600
+#: Deeper than this part of the mean edge even once, or faster [m/s], bodies were thrown about.
+TOO_DEEP, TOO_FAST = 5.0, 30.0
 #: What hands do before the next round begins, and how many of these are cuts at most.
 EPISODES, CUTS = 40, 4
 #: Where the probe waits, above everything [m].
@@ -102,6 +104,16 @@ class Soak:
             depth = report.max_depth / self._edge
             self._deepest = max(self._deepest, depth)
             self._deep_since = self._deep_since + 1 if depth > DEEP else 0
+            fastest = max(
+                float(np.linalg.norm(velocities, axis=1).max())
+                for body, velocities in zip(
+                    self._simulation.model.bodies, self._simulation.velocities, strict=True
+                )
+                if body.rigid is None
+            )
+            if depth > TOO_DEEP or fastest > TOO_FAST:
+                fault = f"{depth:.1f} edges deep, {fastest:.0f} m/s"
+                self.faults.append(f"step {self.steps}: {fault}")
             if self._deep_since == LASTING:
                 self.faults.append(f"step {self.steps}: a node is stuck {depth:.2f} edges deep")
             if self.steps % 500 == 0:
