@@ -3,10 +3,14 @@
 import os
 from pathlib import Path
 
+import hypothesis
 import numpy as np
 import pytest
 
 import palpate
+
+hypothesis.settings.register_profile("fixed", derandomize=True)
+hypothesis.settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "default"))
 
 #: A cube of unit edge: five tetrahedra around an inner one.
 CUBE_NODES = np.array(

@@ -138,9 +138,12 @@ impl MovingBody {
         self.expected_nodes.clear();
         match &mut self.kind {
             BodyKind::Elastic(elastic) => {
-                self.expected_forces.copy_from_slice(&self.contact_forces);
-                let loaded = |&&node: &&u32| self.contact_forces[node as usize] != [0.0; 3];
-                self.expected_nodes.extend(surface.iter().filter(loaded));
+                expect(
+                    &self.contact_forces,
+                    surface,
+                    &mut self.expected_forces,
+                    &mut self.expected_nodes,
+                );
                 let contact = self.touched.then_some(&*self.contact_forces);
                 elastic.predict(&self.positions, &self.velocities, &self.forces, contact, part);
                 elastic.end_positions(&self.positions, &mut self.expected_positions);
@@ -240,10 +243,7 @@ impl MovingBody {
         if !touched || !elastic.improve(&self.positions, &self.forces, &self.contact_forces) {
             return false;
         }
-        self.expected_forces.copy_from_slice(&self.contact_forces);
-        let loaded = |&&node: &&u32| self.contact_forces[node as usize] != [0.0; 3];
-        self.expected_nodes.clear();
-        self.expected_nodes.extend(surface.iter().filter(loaded));
+        expect(&self.contact_forces, surface, &mut self.expected_forces, &mut self.expected_nodes);
         elastic.end_positions(&self.positions, &mut self.expected_positions);
         true
     }
@@ -318,6 +318,13 @@ impl MovingBody {
             self.compliance.clear();
         }
     }
+}
+
+/// Takes contact forces as those that are expected, and the surface nodes that they act on.
+fn expect(contact: &[Point], surface: &[u32], forces: &mut [Point], nodes: &mut Vec<u32>) {
+    forces.copy_from_slice(contact);
+    nodes.clear();
+    nodes.extend(surface.iter().filter(|&&node| contact[node as usize] != [0.0; 3]));
 }
 
 /// Index of the first vector with an infinite or undefined component.

@@ -175,15 +175,7 @@ impl Dynamics {
         if !(time_step.is_finite() && time_step > 0.0) {
             return Err(MechanicsError::TimeStep(time_step));
         }
-        let pool = match options.threads {
-            0 | 1 => None,
-            threads => Some(
-                rayon::ThreadPoolBuilder::new()
-                    .num_threads(threads)
-                    .build()
-                    .map_err(|error| MechanicsError::Threads(error.to_string()))?,
-            ),
-        };
+        let pool = start_threads(options.threads)?;
         let make = |index: usize| {
             MovingBody::new(index, &model.bodies[index], model.gravity, time_step, known(index))
         };
@@ -253,6 +245,18 @@ impl Dynamics {
             std::mem::take(&mut self.tasks).into_iter().flatten().collect();
         bodies.sort_unstable_by_key(|body| body.index);
         bodies
+    }
+
+    /// Starts the threads anew: a process that was forked has none of its parent's.
+    ///
+    /// # Errors
+    /// If they could not be started.
+    pub fn restart_threads(&mut self) -> Result<(), MechanicsError> {
+        if let Some(pool) = start_threads(self.options.threads)? {
+            // The end of those that are gone would be waited for in vain.
+            std::mem::forget(self.pool.replace(pool));
+        }
+        Ok(())
     }
 
     /// How the bodies are stepped.
@@ -719,6 +723,14 @@ impl Dynamics {
     pub fn factor_stats(&self, body: usize) -> Option<FactorStats> {
         self.body(body).elastic().map(crate::body::ElasticBody::factor_stats)
     }
+}
+
+fn start_threads(threads: usize) -> Result<Option<rayon::ThreadPool>, MechanicsError> {
+    if threads <= 1 {
+        return Ok(None);
+    }
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+    pool.map(Some).map_err(|error| MechanicsError::Threads(error.to_string()))
 }
 
 /// Ties what the model attaches.

@@ -1,4 +1,4 @@
-//! Object data on disk, by extension. A format is a file below and its line in [`FORMATS`].
+//! Object data on disk, by extension. A format is a file below and its line in `FORMATS`.
 
 mod model;
 mod seg;

@@ -227,20 +227,8 @@ impl Simulation {
         let scene = Scene::new(meshes, Some(&model.structure), scene_options)?;
         let SimulationOptions { time_step, threads, .. } = options;
         let dynamics = Dynamics::new(&model, DynamicsOptions { time_step, threads })?;
-        let pending = PendingFaces::new();
-        let (state, penetration) = (dynamics.state(), Vec::new());
-        let initial = Snapshot { model: Arc::clone(&model), state, pending: pending.clone() };
-        Ok(Self {
-            model,
-            options,
-            scene,
-            dynamics,
-            initial,
-            pending,
-            penetration,
-            finer: None,
-            loops: Vec::new(),
-        })
+        let state = dynamics.state();
+        Ok(Self::of_parts(model, options, (scene, dynamics), state, PendingFaces::new()))
     }
 
     /// Moves everything on by one time step.
@@ -434,20 +422,29 @@ impl Simulation {
         state: State,
         pending: PendingFaces,
     ) -> Result<Self, SimulationError> {
-        let (scene, dynamics) = change::parts(&model, options, &state)?;
+        let parts = change::parts(&model, options, &state)?;
+        Ok(Self::of_parts(model, options, parts, state, pending))
+    }
+
+    fn of_parts(
+        model: Arc<Model>,
+        options: SimulationOptions,
+        (scene, dynamics): (Scene, Dynamics),
+        state: State,
+        pending: PendingFaces,
+    ) -> Self {
         let initial = Snapshot { model: Arc::clone(&model), state, pending: pending.clone() };
-        let penetration = Vec::new();
-        Ok(Self {
+        Self {
             model,
             options,
             scene,
             dynamics,
             initial,
             pending,
-            penetration,
+            penetration: Vec::new(),
             finer: None,
             loops: Vec::new(),
-        })
+        }
     }
 
     /// Cauchy stress [Pa] of each tetrahedron: xx, yy, zz, xy, yz, xz. `None` for rigid bodies and for the

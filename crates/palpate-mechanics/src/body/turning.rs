@@ -58,14 +58,15 @@ impl Rotations {
 
     /// Mean of displacements, and the turn in them.
     pub(super) fn rigid_part(&self, masses: &[f64], values: &[[f64; 3]]) -> (DVec3, DVec3) {
-        let (mut mass, mut mean, mut moment) = (0.0, DVec3::ZERO, DVec3::ZERO);
-        for ((&m, r), &d) in masses.iter().zip(&self.arms).zip(values) {
-            let d = DVec3::from_array(d);
-            mass += m;
-            mean += m * d;
-            moment += m * r.cross(d);
-        }
-        (mean / mass, self.inverse_inertia * moment)
+        let moments = masses.iter().zip(values).map(|(&m, &d)| m * DVec3::from_array(d));
+        let mean = moments.sum::<DVec3>() / masses.iter().sum::<f64>();
+        (mean, self.inverse_inertia * self.moment(masses, values))
+    }
+
+    /// Angular momentum of displacements.
+    fn moment(&self, masses: &[f64], values: &[[f64; 3]]) -> DVec3 {
+        let terms = masses.iter().zip(&self.arms).zip(values);
+        terms.map(|((&m, r), &d)| m * r.cross(DVec3::from_array(d))).sum()
     }
 
     /// Takes the inertial loads of the turn out of `loads`; returns their torque.
@@ -81,8 +82,7 @@ impl Rotations {
 
     /// Replaces the turn in `response` by the one that `torque` causes.
     pub(super) fn turn(&self, masses: &[f64], torque: DVec3, response: &mut [[f64; 3]]) {
-        let terms = masses.iter().zip(&self.arms).zip(&*response);
-        let moment: DVec3 = terms.map(|((&m, r), &d)| m * r.cross(DVec3::from_array(d))).sum();
+        let moment = self.moment(masses, response);
         let turn = self.inverse_inertia * (self.gain * torque - moment);
         for (r, d) in self.arms.iter().zip(response) {
             *d = (DVec3::from_array(*d) + turn.cross(*r)).to_array();

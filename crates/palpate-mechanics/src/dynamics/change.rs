@@ -3,7 +3,6 @@
 use std::sync::Arc;
 
 use palpate_model::{MeshChange, Model};
-use rayon::ThreadPoolBuilder;
 
 use super::{Dynamics, attach, check_orders};
 use crate::body::{Known, MovingBody};
@@ -12,20 +11,6 @@ use crate::error::MechanicsError;
 use crate::state::{BodyState, ContactForce, State};
 
 impl Dynamics {
-    /// Starts the threads anew: a process that was forked has none of its parent's.
-    ///
-    /// # Errors
-    /// If they could not be started.
-    pub fn restart_threads(&mut self) -> Result<(), MechanicsError> {
-        if self.pool.is_some() {
-            let pool = ThreadPoolBuilder::new().num_threads(self.options.threads).build();
-            let pool = pool.map_err(|error| MechanicsError::Threads(error.to_string()))?;
-            // The end of those that are gone would be waited for in vain.
-            std::mem::forget(self.pool.replace(pool));
-        }
-        Ok(())
-    }
-
     /// Goes on with a body whose mesh was changed: `model` is the model after the change, `change` what
     /// became of the mesh of body `index`. Only that body's matrix is made anew.
     ///

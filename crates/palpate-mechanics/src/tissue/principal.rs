@@ -7,7 +7,7 @@
 //! (2019). One stretch of an inverted element is negative: U and V are rotations.
 
 use super::matrix::{self, Matrix};
-use super::projection::{is_semidefinite, rotation, without_negative};
+use super::projection::{self, is_semidefinite, rotation, without_negative};
 use super::real::{Real, positive_part};
 
 /// Jacobi sweeps for the axes of a symmetric matrix: to round-off, from any start.
@@ -70,7 +70,7 @@ impl<R: Real> PrincipalTangent<R> {
         let keep = is_semidefinite(&self.stretching);
         if !is_all(keep) {
             let half = keep.splat(0.5);
-            let projected = without_negative(&self.stretching);
+            let projected = without_negative(&self.stretching, projection::SWEEPS);
             for row in 0..3 {
                 for col in 0..3 {
                     let kept = self.stretching[row][col];

@@ -4,7 +4,7 @@ use super::real::{Real, positive_part};
 
 /// Cyclic Jacobi sweeps. What they leave beside the diagonal only tilts the projection a little: the
 /// result is positive semi-definite whatever they leave.
-const SWEEPS: usize = 6;
+pub(super) const SWEEPS: usize = 6;
 
 /// 1 where `matrix` is positive semi-definite to round-off, else 0: the signs of the pivots.
 #[inline(always)]
@@ -32,10 +32,11 @@ pub(super) fn is_semidefinite<R: Real, const SIZE: usize>(matrix: &[[R; SIZE]; S
     yes
 }
 
-/// The matrix without its negative eigenvalues.
+/// The matrix without its negative eigenvalues, by so many Jacobi sweeps.
 #[inline(always)]
 pub(super) fn without_negative<R: Real, const SIZE: usize>(
     matrix: &[[R; SIZE]; SIZE],
+    sweeps: usize,
 ) -> [[R; SIZE]; SIZE] {
     let like = matrix[0][0];
     let (zero, one) = (like.splat(0.0), like.splat(1.0));
@@ -45,7 +46,7 @@ pub(super) fn without_negative<R: Real, const SIZE: usize>(
     for k in 0..SIZE {
         vectors[k][k] = one;
     }
-    for _ in 0..SWEEPS {
+    for _ in 0..sweeps {
         for p in 0..SIZE {
             for q in p + 1..SIZE {
                 let (c, s) = rotation(diagonal[p][p], diagonal[q][q], diagonal[p][q]);

@@ -287,6 +287,9 @@ impl ElasticBody {
             std::mem::swap(&mut method.scratch, &mut method.residual);
             self.find_residual(method, forces, contact);
             self.shorten_move(method, known, forces, contact);
+            if iteration + 1 == most {
+                break;
+            }
             let QuasiNewton { pairs, residual, scratch, .. } = &mut *method;
             let pair = &mut pairs[known];
             for ((y, r), before) in pair.y.iter_mut().zip(&*residual).zip(&*scratch) {
