@@ -175,6 +175,54 @@ def test_marked_nodes_change_colour():
     assert after[1] > before[1] + 60  # yellow has more green than red has
 
 
+def test_wires_are_seen_before_and_faintly_behind_a_body():
+    red = ball((0, 0, 0))
+    camera = pictures.Camera(np.eye(3), (0.0, 0.0), 4.0, 4.0)
+    size = (80, 80)
+    plain = pictures.render([red], camera, size=size).astype(int)
+
+    def drawn(height):
+        """A line across the picture at a height towards the eye, one that ends, one outside."""
+        ends = [
+            [[-3, 0.02, height], [3, 0.02, height]],
+            [[0, 1.5, 0], [0, 1.52, 0]],
+            [[9, 9, 0]] * 2,
+        ]
+        lines = [pictures.Wires(np.array(ends, dtype=float), (0.0, 0.0, 1.0))]
+        shown = pictures.render([red], camera, size=size, wires=lines).astype(int)
+        return np.abs(shown - plain).max(axis=2)
+
+    before, behind = drawn(2.0), drawn(-2.0)
+    rows, columns = np.nonzero(before)
+    assert set(rows.tolist()) <= {8, 9, 10, 39, 40}
+    assert set(columns[rows >= 39].tolist()) == set(range(80))
+    assert set(columns[rows <= 10].tolist()) <= {39, 40}
+    middle = slice(30, 50)
+    assert before[39:41, middle].max(axis=0).min() > 3 * behind[39:41, middle].max() > 0
+    assert np.array_equal(before[39:41, :5], behind[39:41, :5])  # beside the ball nothing hides
+
+
+def test_wires_of_boxes_are_their_twelve_edges():
+    boxes = np.array([[[0, 0, 0], [1, 2, 3]], [[5, 5, 5], [5, 6, 7]]], dtype=float)
+    ends = pictures.box_wires(boxes, (0, 0, 0)).ends
+    assert ends.shape == (24, 2, 3)
+    for box, edges in zip(boxes, ends.reshape(2, 12, 2, 3), strict=True):
+        corners = {tuple(x[i] for x, i in zip(box.T, c, strict=True)) for c in np.ndindex(2, 2, 2)}
+        assert {tuple(corner) for edge in edges for corner in edge} == corners
+        assert ((edges[:, 0] != edges[:, 1]).sum(axis=1) <= 1).all()
+        assert len({tuple(sorted(map(tuple, edge))) for edge in edges[:, :]}) >= 7
+
+
+def test_faces_of_cuts_are_paler():
+    plain = ball((0, 0, 0))
+    camera = pictures.frame([plain.positions], aspect=1.0)
+    raw = ball((0, 0, 0), inside=np.ones(len(plain.triangles), dtype=np.uint8))
+    whole = ball((0, 0, 0), inside=np.zeros(len(plain.triangles), dtype=np.uint8))
+    before, after = middle_color([plain], camera), middle_color([raw], camera)
+    assert (after[1:] > before[1:] + 30).all()
+    assert np.array_equal(middle_color([whole], camera), before)
+
+
 def test_other_sizes_do_not_distort():
     red = ball((0, 0, 0))
     camera = pictures.frame([red.positions], aspect=1.0)

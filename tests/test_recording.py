@@ -4,6 +4,7 @@ import base64
 import gzip
 import re
 from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,12 +12,16 @@ from PIL import Image
 from typer.testing import CliRunner
 
 import palpate
+from palpate import pictures
 from palpate.cli import app
+from palpate.results import drawing
 from palpate.results.reading import RecordingError, read_frame, read_report, read_series
 from palpate.results.vtu import Grid
 from palpate.viewer import NullViewer, recorded
+from palpate.viewer.live import LivePlayer
 from palpate.viewer.protocol import decode
-from palpate.viewer.recorded import RecordedPlayer, Recording, boundary
+from palpate.viewer.recorded import RecordedPlayer
+from palpate.viewer.recording import Recording, boundary
 from palpate.viewer.surface import Surfaces
 
 
@@ -198,7 +203,7 @@ def test_a_film_of_a_model(tmp_path):
 
 
 def test_runs_that_know_no_stress_are_played(finished, tmp_path, monkeypatch):
-    monkeypatch.setattr(recorded, "_STRESS", "of old runs")
+    monkeypatch.setattr(recorded, "STRESS", "of old runs")
     viewer = NullViewer(lambda: RecordedPlayer(Recording(finished)))
     assert "stress" not in viewer.header("hello")["fields"]
     viewer.send({"type": "show", "field": "stress", "contacts": False, "touching": False})
@@ -235,6 +240,38 @@ def test_render_draws_models_and_runs(finished, tmp_path):
     assert sorted(each.name for each in tmp_path.iterdir()) == ["a.png", "b.png", "c.gif"]
 
 
+@pytest.mark.parametrize("target", ["model", "run"])
+def test_render_draws_the_boxes_of_a_level(finished, tmp_path, monkeypatch, target):
+    drawn = []
+
+    def watched(shapes, camera, **options):
+        drawn.append(options["wires"])
+        return pictures.render(shapes, camera, **options)
+
+    monkeypatch.setattr(
+        drawing, "pictures", SimpleNamespace(**{**vars(pictures), "render": watched})
+    )
+    shown = ["small", "--duration", 0.2] if target == "model" else [finished]
+    simulation = palpate.Simulation("small")
+    simulation.step(12)
+    files = []
+    for level in (None, 0, 4, 10**6):
+        files.append(tmp_path / f"{level}.png")
+        chosen = [] if level is None else ["--boxes", level]
+        run("render", *shown, "-o", files[-1], "--width", 160, *chosen)
+        wires = drawn.pop()
+        assert drawn == []
+        boxes = [] if level is None else [simulation.boxes(body, level) for body in range(4)]
+        for lines, expected in zip(wires, boxes, strict=True):
+            # 12 edges between the low and the high corner.
+            edges = lines.ends.reshape(len(expected), 24, 3)
+            assert np.array_equal(edges.min(axis=1), expected[:, 0])
+            assert np.array_equal(edges.max(axis=1), expected[:, 1])
+            lengths = np.abs(lines.ends[:, 1] - lines.ends[:, 0]).reshape(-1, 12, 3)
+            assert np.allclose(lengths.sum(axis=1), 4 * (expected[:, 1] - expected[:, 0]))
+    assert len({path.read_bytes() for path in files}) == 4
+
+
 @pytest.mark.parametrize(
     ("arguments", "status", "text"),
     [
@@ -264,5 +301,49 @@ def test_cuts_are_played(tmp_path):
     viewer.send({"type": "seek", "frame": 0})
     assert np.array_equal(viewer.arrays("scene")["triangles/0"], whole["triangles/0"])
     run("view", folder, "--export", tmp_path / "film.html")
-    kinds = [header["type"] for header, _ in messages_of((tmp_path / "film.html").read_text())]
+    messages = messages_of((tmp_path / "film.html").read_text())
+    kinds = [header["type"] for header, _ in messages]
     assert kinds == ["hello", "scene", "scene", "frame", "frame", "frame"]
+    assert not any(name.startswith("cut/") for name in messages[1][1])
+    assert np.array_equal(messages[2][1]["cut/0"], cut["cut/0"])
+
+
+def test_cut_faces_of_a_run_are_those_of_the_simulation(tmp_path):
+    (tmp_path / "cut.blade").write_text("blade 1\nplane at 0.05 s\n  0 0 0.03  1 0 0\n")
+    folder = tmp_path / "out"
+    arguments = ["--duration", 0.1, "--every", 3, "--no-pictures", "--output", folder]
+    run("simulate", "small", *arguments, "--cut", tmp_path / "cut.blade", "--checkpoint")
+    loaded = palpate.Simulation.load(folder / "checkpoint.palpate")
+    recording = Recording(folder)
+    _, parts = recording.frame(2)
+    live = NullViewer(lambda: LivePlayer(loaded)).arrays("scene")
+    found = recording.cut_faces(parts)
+    assert [cut is not None and cut.any() for cut in found] == [True, True, True, False]
+    for index, cut in enumerate(found[:3]):
+        # The same triangles, in another order.
+        mesh = loaded.model.bodies[index].mesh
+        expected = live[f"cut/{index}"]
+        middles = [
+            sorted(map(tuple, np.sort(triangles[marks != 0], axis=1)))
+            for triangles, marks in ((mesh.triangles, expected), (parts.triangles[index], cut))
+        ]
+        assert middles[0] == middles[1]
+        # Lips come in pairs, in the plane of the cut as it was when the blade came.
+        assert int(expected.sum()) % 2 == 0
+
+
+def test_boxes_of_a_run_are_those_of_the_simulation(finished):
+    viewer = NullViewer(lambda: RecordedPlayer(Recording(finished)))
+    assert "levels" in viewer.header("hello")["features"]
+    viewer.send({"type": "seek", "frame": 4})
+    simulation = palpate.Simulation("small")
+    simulation.step(12)
+    for level in (1, 5, 16):
+        viewer.send(
+            {"type": "show", "field": None, "contacts": False, "touching": False, "level": level}
+        )
+        boxes = [simulation.boxes(body, level) for body in range(4)]
+        found = viewer.arrays("frame")
+        expected = np.concatenate(boxes).reshape(-1, 6).astype(np.float32)
+        assert np.array_equal(found[f"boxes/{level}"], expected)
+        assert found[f"box_counts/{level}"].tolist() == [len(each) for each in boxes]

@@ -9,10 +9,13 @@ import numpy as np
 import pytest
 
 import palpate
+from palpate.results.frames import FrameSeries
 from palpate.viewer import Viewer, Wishes
 from palpate.viewer.export import export_film
 from palpate.viewer.live import LivePlayer
 from palpate.viewer.protocol import decode
+from palpate.viewer.recorded import RecordedPlayer
+from palpate.viewer.recording import Recording
 
 SIZE = (640, 420)
 
@@ -292,6 +295,29 @@ def test_a_film_plays_without_a_server(browser, tmp_path):
     assert page.problems == []
     assert all(url.startswith(("file:", "data:", "blob:")) for url in page.requests)
     page.close()
+
+
+def test_a_run_shows_its_boxes_and_the_faces_of_its_cuts(browser, tmp_path):
+    simulation = palpate.Simulation("small")
+    frames = FrameSeries(tmp_path, simulation)
+    frames.add(simulation)
+    simulation.cut(palpate.Blade.plane((0, 0, 0.03), (1, 0, 0)))
+    simulation.step(3)
+    frames.add(simulation)
+    frames.finish()
+    recording = Recording(tmp_path)
+    with Viewer(lambda: RecordedPlayer(recording), port=0, play=False) as viewer:
+        page = browser.open(viewer.url)
+        page.wait("globalThis.palpate?.received > 0")
+        assert page.run("palpate.stage.bodies.every((each) => each.inside === null)")
+        page.run("palpate.send({ type: 'seek', frame: 1 })")
+        page.wait("palpate.stage.bodies[0].inside?.some((each) => each === 1)")
+        for _ in range(3):
+            page.key("]")
+        page.wait("palpate.overlay.boxCount === palpate.last.arrays['boxes/3']?.length / 6")
+        page.wait("/3: [0-9]+ boxes/.test(document.getElementById('panel').textContent)")
+        assert page.problems == []
+        page.close()
 
 
 def test_a_model_error_is_shown_as_in_the_terminal(browser, tmp_path):

@@ -167,6 +167,11 @@ class Simulation:
         return self._model
 
     @property
+    def initial_model(self) -> Model:
+        """The model that `reset` returns to, before the cuts."""
+        return Model._from_core(self._core.initial_model)
+
+    @property
     def time(self) -> float:
         """Simulated time [s]."""
         return self._core.time

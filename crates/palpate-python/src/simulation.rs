@@ -138,6 +138,11 @@ impl PySimulation {
     }
 
     #[getter]
+    fn initial_model(&self, py: Python<'_>) -> PyModel {
+        PyModel { model: self.simulation.lock_attached(py).initial_model().clone() }
+    }
+
+    #[getter]
     fn time(&self, py: Python<'_>) -> f64 {
         self.simulation.lock_attached(py).time()
     }

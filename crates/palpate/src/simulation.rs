@@ -295,6 +295,11 @@ impl Simulation {
         &self.model
     }
 
+    /// The model that [`Self::reset`] returns to, before cuts.
+    pub fn initial_model(&self) -> &Arc<Model> {
+        self.initial.model()
+    }
+
     /// The options it was made with.
     pub fn options(&self) -> &SimulationOptions {
         &self.options

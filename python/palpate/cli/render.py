@@ -11,6 +11,7 @@ import typer
 
 from palpate.cli.opening import open_model
 from palpate.cli.output import ThreadsOption, console, parse_seconds
+from palpate.results.cut_faces import CutFaces
 from palpate.results.drawing import (
     Look,
     Moment,
@@ -52,6 +53,15 @@ def command(
             show_default=False,
         ),
     ] = None,
+    boxes: Annotated[
+        int | None,
+        typer.Option(
+            min=0,
+            metavar="LEVEL",
+            help="Draw the boxes so many splits below the box of each body, 0.",
+            show_default=False,
+        ),
+    ] = None,
     width: Annotated[int, typer.Option(min=64, max=8192, help="Pixels of one picture.")] = 1280,
     time_step: Annotated[
         float,
@@ -67,6 +77,8 @@ def command(
 
     Example: palpate render case1 --duration 1.5 --frames 3 -o strip.png
 
+    Example: palpate render case2 --boxes 6 -o boxes.png
+
     Example: palpate render out --frames 60 --width 640 -o film.gif
     """
     suffix = output.suffix.lower()
@@ -77,28 +89,36 @@ def command(
     if Path(target).is_dir():
         if duration is not None:
             raise typer.BadParameter("--duration: a run on disk has its own")
-        moments, looks, up = _recorded(Path(target), frames)
+        moments, looks, up = _recorded(Path(target), frames, boxes)
     else:
         if frames is not None and duration is None:
             raise typer.BadParameter("--frames: say with --duration how long to simulate")
-        moments, looks, up = _simulated(target, duration or 0.0, frames, time_step, threads)
+        moments, looks, up = _simulated(target, duration or 0.0, frames, time_step, threads, boxes)
     write = write_film if suffix == ".gif" else write_strip
     write(output, moments, looks, up, width)
     console().print(f"{output}: {len(moments)} moments" if frames else str(output))
 
 
-def _recorded(folder: Path, frames: int | None) -> tuple[list[Moment], list[Look], Sequence[float]]:
-    from palpate.viewer.recorded import Recording
+def _recorded(
+    folder: Path, frames: int | None, level: int | None
+) -> tuple[list[Moment], list[Look], Sequence[float]]:
+    from palpate.viewer.recording import Recording
 
     recording = Recording(folder)
     last = len(recording) - 1
     picked = [last] if frames is None else _spread(last, frames)
     _, parts = recording.frame(last)
-    return [recording.moment(index) for index in picked], recording.looks(parts), recording.up
+    moments = [recording.moment(index, level) for index in picked]
+    return moments, recording.looks(parts), recording.up
 
 
 def _simulated(
-    target: str, duration: float, frames: int | None, time_step: float, threads: int
+    target: str,
+    duration: float,
+    frames: int | None,
+    time_step: float,
+    threads: int,
+    level: int | None,
 ) -> tuple[list[Moment], list[Look], Sequence[float]]:
     if Path(target).suffix == ".palpate":
         simulation = Simulation.load(target, threads=threads)
@@ -107,12 +127,13 @@ def _simulated(
         simulation = Simulation(model, time_step=time_step, threads=threads)
     steps = math.ceil(duration / simulation.time_step - 1e-9)
     picked = [steps] if frames is None else _spread(steps, frames)
+    faces = CutFaces.since_the_start(simulation)
     moments = []
     for step in range(steps + 1):
         if step > 0:
             simulation.step()
         if step in picked:
-            moments.append(moment_of(simulation))
+            moments.append(moment_of(simulation, faces, level))
     return moments, looks_of(simulation.model.bodies), upward(simulation.model.gravity)
 
 

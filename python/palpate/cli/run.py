@@ -79,7 +79,7 @@ class Run:
         simulation, options = self._simulation, self._options
         record = Record(simulation)
         frames = FrameSeries(self._folder, simulation)
-        album = Album(simulation.model)
+        album = Album(simulation)
         started, start_time = time.perf_counter(), simulation.time
         frames.add(simulation)
         album.add(simulation)

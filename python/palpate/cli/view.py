@@ -73,7 +73,8 @@ def command(
     from palpate.viewer import Player, Viewer
     from palpate.viewer.export import export_film
     from palpate.viewer.live import LivePlayer
-    from palpate.viewer.recorded import RecordedPlayer, Recording
+    from palpate.viewer.recorded import RecordedPlayer
+    from palpate.viewer.recording import Recording
 
     path = Path(target)
     recorded = path.is_dir()

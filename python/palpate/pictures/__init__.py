@@ -3,6 +3,7 @@
 from palpate.pictures.camera import Camera, frame
 from palpate.pictures.files import PictureError, available, save_picture
 from palpate.pictures.render import HIGHLIGHT, PALETTE, RIGID, Image, Shape, render
+from palpate.pictures.wires import Wires, box_wires
 
 __all__ = [
     "HIGHLIGHT",
@@ -12,7 +13,9 @@ __all__ = [
     "Image",
     "PictureError",
     "Shape",
+    "Wires",
     "available",
+    "box_wires",
     "frame",
     "render",
     "save_picture",

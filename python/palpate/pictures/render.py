@@ -12,6 +12,7 @@ from palpate._arrays import Float64Array
 from palpate.pictures.camera import Camera
 from palpate.pictures.raster import Fragments, rasterize
 from palpate.pictures.shadow import surroundings_shade
+from palpate.pictures.wires import Wires, draw_wires
 
 FloatImage = npt.NDArray[np.float32]
 Image = npt.NDArray[np.uint8]
@@ -29,6 +30,9 @@ PALETTE = (
 )
 RIGID = (0.80, 0.81, 0.83)
 HIGHLIGHT = (1.0, 0.86, 0.20)
+#: What is seen inside of a body, and how much of it a face has that was cut.
+_FLESH = (0.96, 0.80, 0.74)
+_RAW = 0.6
 #: Top and bottom of the background.
 BACKGROUND = ((0.985, 0.988, 0.992), (0.90, 0.915, 0.935))
 
@@ -46,7 +50,8 @@ _VEIL = 0.28
 class Shape:
     """What is drawn: node positions [m], shape (n, 3), surface triangles (t, 3), and their look.
 
-    ``highlights`` (n,) in 0..1 says how strongly each node is marked; None: not at all.
+    ``highlights`` (n,) in 0..1 says how strongly each node is marked; None: not at all. ``inside``
+    (t,), not 0 for triangles that a blade laid open, paler than the others; None: there are none.
     """
 
     positions: Float64Array
@@ -55,6 +60,7 @@ class Shape:
     opacity: float = 1.0
     rigid: bool = False
     highlights: Float64Array | None = None
+    inside: npt.NDArray[np.integer] | None = None
 
 
 def render(
@@ -63,6 +69,7 @@ def render(
     *,
     size: tuple[int, int] | None = None,
     samples: int = 2,
+    wires: Sequence[Wires] = (),
 ) -> Image:
     """Draw shapes; returns an image of shape (rows, columns, 3).
 
@@ -76,6 +83,8 @@ def render(
         Columns and rows of the image; by default 1280 columns, and the rows that suit the camera.
     samples : int
         Each pixel is the mean of ``samples`` squared.
+    wires : sequence of Wires
+        Lines, a pixel wide.
     """
     size = camera.size(1280) if size is None else size
     camera = camera.fitted(size)
@@ -110,6 +119,7 @@ def render(
             at = seen[visible]
             alpha = layer.opacity[visible, None]
             image[at] = (1 - alpha) * image[at] + alpha * layer.shaded(None)[visible]
+    draw_wires(image, front, wires, camera, fine, samples)
     coarse = image.reshape(size[1], samples, size[0], samples, 3).mean(axis=(1, 3))
     return np.asarray(np.clip(coarse * 255 + 0.5, 0, 255), dtype=np.uint8)
 
@@ -148,6 +158,15 @@ def _layer(shapes: Sequence[Shape], camera: Camera, size: tuple[int, int]) -> _L
     weights = fragments.weights
     owner = np.searchsorted(offsets, corners[:, 0], side="right") - 1
     base = np.asarray([shape.color for shape in shapes], dtype=np.float32)[owner]
+    inside = np.concatenate(
+        [
+            np.zeros(len(shape.triangles), dtype=bool)
+            if shape.inside is None
+            else np.asarray(shape.inside) != 0
+            for shape in shapes
+        ]
+    )[fragments.triangles, None]
+    base = np.where(inside, (1 - _RAW) * base + _RAW * np.asarray(_FLESH, np.float32), base)
     mark = (marks[corners] * weights).sum(axis=1)
     # A steep ramp: the marked zone has a clear border.
     mark = np.clip(1.6 * mark - 0.3, 0, 1)[:, None]

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from palpate import pictures
-from palpate.model import Model
+from palpate.results.cut_faces import CutFaces
 from palpate.results.drawing import Moment, framed, looks_of, moment_of, shapes, upward
 from palpate.simulation import Simulation
 
@@ -21,9 +21,11 @@ _KEPT = 33
 class Album:
     """Keeps moments, spread evenly over a run of unknown length, and draws three of them."""
 
-    def __init__(self, model: Model) -> None:
+    def __init__(self, simulation: Simulation) -> None:
+        model = simulation.model
         self._looks = looks_of(model.bodies)
         self._up = upward(model.gravity)
+        self._faces = CutFaces.since_the_start(simulation)
         self._moments: list[Moment] = []
         self._stride = 1
         self._seen = 0
@@ -31,7 +33,7 @@ class Album:
 
     def add(self, simulation: Simulation) -> None:
         """Look at the present state; kept if it is the stride's turn."""
-        self._last = moment_of(simulation)
+        self._last = moment_of(simulation, self._faces)
         if self._seen % self._stride == 0:
             self._moments.append(self._last)
             if len(self._moments) > _KEPT:

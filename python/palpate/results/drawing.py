@@ -16,10 +16,13 @@ from palpate._arrays import Float64Array
 from palpate.model import Body
 from palpate.pictures.files import PictureError
 from palpate.results.atomic import replacing
+from palpate.results.cut_faces import CutFaces
 from palpate.simulation import Simulation
 
 #: Milliseconds that a film shows the last frame.
 _LAST = 1200
+#: Boxes are darker than their bodies by this.
+_WIRE = 0.55
 
 
 @dataclass(frozen=True)
@@ -36,23 +39,29 @@ class Look:
 class Moment:
     """A state to draw.
 
-    Per body: ``positions`` [m] (n, 3), ``triangles`` (m, 3), and ``touched`` (n,), 1 where a
-    contact or spring acts.
+    Per body: ``positions`` [m] (n, 3), ``triangles`` (m, 3), ``touched`` (n,), 1 where a
+    contact or spring acts, ``cut`` (m,), 1 for triangles that a blade made, or None, and
+    ``boxes`` (k, 2, 3) [m] of its bounding tree; without any boxes, none are drawn.
     """
 
     time: float
     positions: tuple[Float64Array, ...]
     triangles: tuple[npt.NDArray[np.integer], ...]
     touched: tuple[Float64Array, ...]
+    cut: tuple[npt.NDArray[np.uint8] | None, ...]
+    boxes: tuple[Float64Array, ...] = ()
 
 
-def moment_of(simulation: Simulation) -> Moment:
-    """The present state."""
+def moment_of(simulation: Simulation, faces: CutFaces, level: int | None = None) -> Moment:
+    """The present state, with the ``faces`` of cuts and the boxes at a level of the trees."""
+    bodies = simulation.model.bodies
     touched = tuple(
         (np.abs(forces).max(axis=1) > 0).astype(np.float64) for forces in simulation.contact_forces
     )
-    triangles = tuple(body.mesh.triangles for body in simulation.model.bodies)
-    return Moment(simulation.time, simulation.positions, triangles, touched)
+    triangles = tuple(body.mesh.triangles for body in bodies)
+    cut = tuple(faces.of_mesh(body.name, body.mesh) for body in bodies)
+    boxes = () if level is None else tuple(simulation.boxes(body.name, level) for body in bodies)
+    return Moment(simulation.time, simulation.positions, triangles, touched, cut, boxes)
 
 
 def looks_of(bodies: Iterable[Body]) -> list[Look]:
@@ -85,7 +94,7 @@ def upward(gravity: Sequence[float]) -> tuple[float, float, float]:
 
 
 def shapes(moment: Moment, looks: Sequence[Look]) -> list[pictures.Shape]:
-    """What `pictures.render` draws; touched nodes are marked."""
+    """What `pictures.render` draws; touched nodes and the faces of cuts are marked."""
     return [
         pictures.Shape(
             positions,
@@ -94,11 +103,27 @@ def shapes(moment: Moment, looks: Sequence[Look]) -> list[pictures.Shape]:
             opacity=look.opacity,
             rigid=look.rigid,
             highlights=None if look.rigid else touched,
+            inside=cut,
         )
-        for look, positions, triangles, touched in zip(
-            looks, moment.positions, moment.triangles, moment.touched, strict=True
+        for look, positions, triangles, touched, cut in zip(
+            looks, moment.positions, moment.triangles, moment.touched, moment.cut, strict=True
         )
     ]
+
+
+def wires(moment: Moment, looks: Sequence[Look]) -> list[pictures.Wires]:
+    """The boxes of a moment in the colours of their bodies."""
+    return [
+        pictures.box_wires(each, [_WIRE * part for part in look.color])
+        for look, each in zip(looks, moment.boxes, strict=False)
+    ]
+
+
+def picture(
+    moment: Moment, looks: Sequence[Look], camera: pictures.Camera, size: tuple[int, int]
+) -> pictures.Image:
+    """A moment drawn."""
+    return pictures.render(shapes(moment, looks), camera, size=size, wires=wires(moment, looks))
 
 
 def framed(
@@ -110,6 +135,8 @@ def framed(
     for moment in moments:
         for look, points in zip(looks, moment.positions, strict=True):
             (rigid if look.rigid else soft).append(points)
+        for look, each in zip(looks, moment.boxes, strict=False):
+            (rigid if look.rigid else soft).append(each.reshape(-1, 3))
     return pictures.frame(soft or rigid, up=up, context=rigid)
 
 
@@ -119,7 +146,7 @@ def write_strip(
     """Write the moments side by side as PNG; ``width`` is that of one in pixels."""
     camera = framed(moments, looks, up)
     size = camera.size(width)
-    images = [pictures.render(shapes(moment, looks), camera, size=size) for moment in moments]
+    images = [picture(moment, looks, camera, size) for moment in moments]
     pictures.save_picture(path, images, [_caption(moment) for moment in moments], camera=camera)
 
 
@@ -130,10 +157,7 @@ def write_film(
     film = _pillow()
     camera = framed(moments, looks, up)
     size = camera.size(width)
-    images = [
-        film.fromarray(pictures.render(shapes(moment, looks), camera, size=size))
-        for moment in moments
-    ]
+    images = [film.fromarray(picture(moment, looks, camera, size)) for moment in moments]
     # One palette for all frames: colours do not flicker.
     sheet = film.new("RGB", (size[0], 3 * size[1]))
     for place, image in enumerate((images[0], images[len(images) // 2], images[-1])):

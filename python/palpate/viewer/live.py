@@ -14,6 +14,7 @@ from palpate._arrays import Float64Array
 from palpate.contacts import DetectionStats
 from palpate.cutting import Blade
 from palpate.model import Body, Model
+from palpate.results.cut_faces import CutFaces
 from palpate.results.drawing import looks_of, upward
 from palpate.results.frames import contact_depths
 from palpate.results.measures import node_means
@@ -22,8 +23,8 @@ from palpate.simulation import Simulation, Snapshot, StepReport
 from palpate.viewer.editing import edited, settings_of, transferred
 from palpate.viewer.hands import Hands
 from palpate.viewer.player import Outcome, Player, Wishes
-from palpate.viewer.protocol import Command, encode, finite
-from palpate.viewer.surface import Surfaces, deformation, inner_triangles
+from palpate.viewer.protocol import Command, box_arrays, encode, finite
+from palpate.viewer.surface import Surfaces, deformation
 
 #: Seconds between two counts of the tested triangle pairs while nobody looks at them closely.
 _COUNT_INTERVAL = 0.5
@@ -43,8 +44,7 @@ class LivePlayer(Player):
         self._start = simulation.model
         self._remade = False
         self._passed = 0.0
-        #: The bodies before cuts, to tell what a blade laid open.
-        self._whole = {body.name: body.mesh for body in simulation.model.bodies}
+        self._cut_faces = CutFaces.since_the_start(simulation)
         self._surfaces = Surfaces([body.mesh for body in simulation.model.bodies])
         self._version = 0
         self._sent = -1
@@ -76,7 +76,7 @@ class LivePlayer(Player):
         return False
 
     def hello(self) -> dict[str, Any]:
-        features = ["settings", "reset", "pull", "tool", "cut"]
+        features = ["settings", "reset", "pull", "tool", "cut", "levels"]
         return {"features": features, "fields": _FIELDS}
 
     def scene(self) -> bytes:
@@ -87,9 +87,9 @@ class LivePlayer(Player):
             seen = body.mesh.nodes[self._surfaces.nodes[index]]
             arrays[f"rest/{index}"] = seen.astype(np.float32)
             arrays[f"triangles/{index}"] = self._surfaces.triangles[index]
-            whole = self._whole.get(body.name.split("/")[0])  # pieces are named kidney/2
-            if whole is not None and len(body.mesh.tetrahedra) != len(whole.tetrahedra):
-                arrays[f"cut/{index}"] = inner_triangles(body.mesh, whole)
+            cut = self._cut_faces.of_mesh(body.name, body.mesh)
+            if cut is not None:
+                arrays[f"cut/{index}"] = cut
         return encode(
             "scene",
             {
@@ -132,9 +132,7 @@ class LivePlayer(Player):
             arrays["contact_forces"] = np.linalg.norm(contacts.forces, axis=1).astype(np.float32)
         for level in wishes.levels:
             boxes = [simulation.boxes(body, level) for body in range(len(positions))]
-            arrays[f"boxes/{level}"] = np.concatenate(boxes).reshape(-1, 6).astype(np.float32)
-            counts = [len(each) for each in boxes]
-            arrays[f"box_counts/{level}"] = np.array(counts, dtype=np.uint32)
+            arrays |= box_arrays(level, boxes)
         now = time.perf_counter()
         if wishes.touching or now - self._counted > _COUNT_INTERVAL:
             found = simulation.intersections()

@@ -32,7 +32,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -92,6 +92,17 @@ def decode(message: bytes) -> tuple[dict[str, Any], dict[str, npt.NDArray[Any]]]
     except (ValueError, KeyError, TypeError) as error:
         raise ProtocolError(f"not a message: {error}") from None
     return header, arrays
+
+
+def box_arrays(
+    level: int, boxes: Sequence[npt.NDArray[np.floating]]
+) -> dict[str, npt.NDArray[Any]]:
+    """A frame's arrays of the boxes (k, 2, 3) of each body at a level of its tree."""
+    counts = [len(each) for each in boxes]
+    return {
+        f"boxes/{level}": np.concatenate(boxes).reshape(-1, 6).astype(np.float32),
+        f"box_counts/{level}": np.array(counts, dtype=np.uint32),
+    }
 
 
 def finite(value: Any) -> Any:

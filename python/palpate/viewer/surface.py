@@ -9,10 +9,6 @@ import numpy.typing as npt
 
 from palpate._arrays import Float64Array
 from palpate.mesh import Mesh
-from palpate.scene import Scene
-
-#: In sizes of the body: what is closer to its surface is on it.
-_ROUNDING = 1e-7
 
 
 class Surfaces:
@@ -46,12 +42,6 @@ class Surfaces:
         self.offsets = _starts(self.nodes)
         self.triangle_offsets = _starts(self.triangles)
         self._stacked = np.empty((int(self.offsets[-1]), 3), dtype=np.float32)
-
-    def local_triangles(self) -> list[npt.NDArray[np.int64]]:
-        """The triangles of each body as rows of all its nodes."""
-        return [
-            nodes[triangles] for nodes, triangles in zip(self.nodes, self.triangles, strict=True)
-        ]
 
     def fits(self, positions: Sequence[Float64Array]) -> bool:
         """Whether the bodies still have as many nodes."""
@@ -89,10 +79,3 @@ def deformation(rest: Float64Array, positions: Float64Array) -> Float64Array:
     rotation = (left * np.array([1.0, 1.0, turn])) @ right
     off: Float64Array = np.linalg.norm(after - before @ rotation, axis=1)
     return off
-
-
-def inner_triangles(mesh: Mesh, whole: Mesh) -> npt.NDArray[np.uint8]:
-    """1 for surface triangles that were inside the ``whole`` mesh, which was cut, else 0; (m,)."""
-    middles = mesh.nodes[mesh.triangles].mean(axis=1)
-    size = float(np.linalg.norm(np.ptp(whole.nodes, axis=0)))
-    return (Scene([whole]).closest(middles).distances > _ROUNDING * size).astype(np.uint8)

@@ -112,7 +112,7 @@ class App {
     this.unframed = false;
     this.time = header.time;
     this.overlay.update(message, positions, this.view);
-    if (this.view.boxes && this.modeOfSource === "live") this.panel.tellLevel(this.overlay.boxCount);
+    if (this.view.boxes && this.can("levels")) this.panel.tellLevel(this.overlay.boxCount);
     this.paint(header, positions);
     this.transport.moment(header);
     this.chips(header);
@@ -244,12 +244,12 @@ class App {
   subscribe() {
     const { field, contacts, touching, boxes, level } = this.view;
     // The boxes of whole bodies are made of the positions, here.
-    this.send({ type: "show", field, contacts, touching, level: boxes && level > 0 ? level : null });
+    this.send({ type: "show", field, contacts, touching, level: boxes && level > 0 && this.can("levels") ? level : null });
   }
 
   /** Show the boxes of a deeper or higher level of the bounding trees. */
   moveLevel(by) {
-    if (this.modeOfSource !== "live") return;
+    if (!this.can("levels")) return;
     this.set({ boxes: true, level: Math.min(DEEPEST, Math.max(0, this.view.level + by)) });
   }
 

@@ -98,7 +98,7 @@ export class Panel {
         check("grid", "Ground", "Grid and shadow (G)"),
       ),
     );
-    if (!this.live) return;
+    if (!app.can("levels")) return;
     const title = "How many splits below the box of the body, level 0 ([ and ])";
     this.show.body.append(
       make("div", { class: "row", title }, make("span", { class: "name" }, "Tree level"), make("div", { class: "field" }, level, this.levelText)),
@@ -269,7 +269,7 @@ export class Panel {
     this.range.value = Math.log10(view.range);
     this.range.disabled = !view.field;
     for (const input of this.element.querySelectorAll("[data-view]")) input.checked = view[input.dataset.view];
-    if (this.live) this.tellLevel();
+    if (this.app.can("levels")) this.tellLevel();
   }
 }
 
