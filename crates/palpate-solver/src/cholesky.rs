@@ -1,8 +1,10 @@
 //! The factor of a body's matrix: made once, solved every step.
 
+mod elimination;
 mod half;
 mod multifrontal;
 mod packed;
+mod product;
 mod real;
 mod supernodes;
 
@@ -240,8 +242,8 @@ impl Cholesky {
         FactorError::NotPositiveDefinite { node, column: 3 * node + place % 3 }
     }
 
-    /// What a solve with a known right-hand side leaves: faer has been seen to return factors of
-    /// broken input.
+    /// What a solve with a known right-hand side leaves: a matrix may be positive definite and yet
+    /// have no factor of use.
     fn probe(&self, matrix: &BlockMatrix) -> Probe {
         let count = self.pattern.node_count();
         let mut state = 1_u32;

@@ -1,12 +1,11 @@
 //! Sparse Cholesky for elastic bodies: order, factor, solve.
 //!
 //! Matrices are symmetric positive definite with one 3x3 block per pair of nodes that share an
-//! element. Order and structure are found on the node graph, supernodes are factored front by front with the
-//! dense kernels of faer on the calling thread, and solving allocates nothing.
+//! element. Order and structure are found on the node graph, supernodes are factored front by front on
+//! the calling thread, with the same bits on any vector unit, and solving allocates nothing.
 
 pub mod block_matrix;
 pub mod cholesky;
-pub mod dense;
 pub mod ordering;
 pub mod rows;
 
@@ -14,6 +13,5 @@ pub use block_matrix::{BlockMatrix, BlockPattern};
 pub use cholesky::{
     Cholesky, FactorError, FactorStats, HalfSolution, Precision, SolveWorkspace, half_products,
 };
-pub use dense::DenseCholesky;
 pub use ordering::{NodeOrder, OrderingMethod};
 pub use rows::add_rows;

@@ -10,7 +10,7 @@ use elimination_tree::EliminationTree;
 /// Which method gave the order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum OrderingMethod {
-    /// Approximate minimum degree (faer's), best on tubes and shells.
+    /// Approximate minimum degree, best on tubes and shells.
     MinimumDegree,
     /// Nested dissection (METIS), best on solid bodies.
     NestedDissection,

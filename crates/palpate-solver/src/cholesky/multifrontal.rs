@@ -5,21 +5,15 @@
 //! stand before their parents, so that theirs are the last ones there. There are two stacks, for generations
 //! by turns, so that a contribution is put together where it stays while those of the children are read.
 
-use faer::dyn_stack::{MemBuffer, MemStack};
-use faer::linalg::cholesky::llt::factor::{
-    LltError, LltRegularization, cholesky_in_place, cholesky_in_place_scratch,
-};
-use faer::linalg::matmul::triangular::{self, BlockStructure};
-use faer::linalg::triangular_solve;
-use faer::reborrow::ReborrowMut;
-use faer::{Accum, MatMut, Par};
-
+use super::elimination::Elimination;
 use super::packed::PackedFactor;
+use super::product::Product;
 use super::real::Real;
 use super::supernodes::Supernodes;
 use crate::BlockMatrix;
 
 /// Memory for factorisations.
+#[derive(Default)]
 pub(super) struct Fronts {
     /// Columns that are eliminated: those of the diagonal block, with all rows.
     columns: Vec<f64>,
@@ -30,9 +24,7 @@ pub(super) struct Fronts {
     /// Stretches of rows of a child that are next to each other in the front as well: where they begin
     /// among its own and in the front, and how many.
     stretches: Vec<[usize; 3]>,
-    scratch: MemBuffer,
-    /// Columns that the scratch memory is enough for.
-    widest: usize,
+    elimination: Elimination,
 }
 
 /// Contributions, the last one on top; memory beyond those is kept.
@@ -62,30 +54,6 @@ impl Stack {
     }
 }
 
-/// A supernode as it is solved with, in the precision of that: the inverse of the diagonal block's factor,
-/// and the block below times that, below a square.
-struct Finished<T> {
-    inverse: Vec<T>,
-    columns: Vec<T>,
-}
-
-impl Default for Fronts {
-    fn default() -> Self {
-        Self {
-            columns: Vec::new(),
-            stacks: [Stack::default(), Stack::default()],
-            places: Vec::new(),
-            stretches: Vec::new(),
-            scratch: MemBuffer::new(scratch(0)),
-            widest: 0,
-        }
-    }
-}
-
-fn scratch(width: usize) -> faer::dyn_stack::StackReq {
-    cholesky_in_place_scratch::<f64>(width, Par::Seq, faer::Spec::default())
-}
-
 impl Fronts {
     /// Factors a matrix into the memory of the last factor; the column of a pivot that is not positive
     /// if there is one. All is done in double precision but for what each supernode is turned into when
@@ -96,7 +64,7 @@ impl Fronts {
         matrix: &BlockMatrix,
         factor: &mut PackedFactor<T>,
     ) -> Result<(), usize> {
-        let mut finished = Finished::<T> { inverse: Vec::new(), columns: Vec::new() };
+        let (mut finished, mut product) = (Vec::new(), Product::default());
         for stack in &mut self.stacks {
             stack.used = 0;
         }
@@ -108,11 +76,15 @@ impl Fronts {
             self.assemble(supernodes, matrix, s);
             let contribution = &mut self.stacks[supernodes.generation(s) % 2];
             let contribution = contribution.top((3 * rows.len()).pow(2));
-            eliminate(&mut self.columns, contribution, 3 * nodes.len(), &mut self.scratch)
+            let width = 3 * nodes.len();
+            self.elimination
+                .eliminate(&mut self.columns, width, contribution)
                 .map_err(|column| first + column)?;
-            finished.take(3 * nodes.len(), &self.columns);
+            finished.clear();
+            finished.extend(self.columns.iter().map(|&value| T::from_f64(value)));
+            self.elimination.finish(&mut finished, width, &mut product);
             let rows = rows.iter().flat_map(|&row| [0, 1, 2].map(|k| 3 * row + k));
-            factor.push(first as u32, rows, &finished.inverse, &finished.columns);
+            factor.push(first as u32, width, rows, &finished);
         }
         Ok(())
     }
@@ -158,66 +130,6 @@ impl Fronts {
             let places = rows.map(|&row| self.places[row as usize]);
             front.add(contribution, places, &mut self.stretches);
         }
-        if width > self.widest {
-            self.widest = width;
-            self.scratch = MemBuffer::new(scratch(width));
-        }
-    }
-}
-
-/// Eliminates the columns, which become those of the factor, and completes the contribution.
-fn eliminate(
-    columns: &mut [f64],
-    contribution: &mut [f64],
-    width: usize,
-    scratch: &mut MemBuffer,
-) -> Result<(), usize> {
-    let height = columns.len() / width;
-    let below = height - width;
-    let columns = MatMut::from_column_major_slice_mut(columns, height, width);
-    let (mut top, mut bottom) = columns.split_at_row_mut(width);
-    cholesky_in_place(
-        top.rb_mut(),
-        LltRegularization::default(),
-        Par::Seq,
-        MemStack::new(scratch),
-        faer::Spec::default(),
-    )
-    .map_err(|LltError::NonPositivePivot { index }| index)?;
-    let transposed = bottom.rb_mut().transpose_mut();
-    triangular_solve::solve_lower_triangular_in_place(top.as_ref(), transposed, Par::Seq);
-    triangular::matmul(
-        MatMut::from_column_major_slice_mut(contribution, below, below),
-        BlockStructure::TriangularLower,
-        Accum::Add,
-        bottom.as_ref(),
-        BlockStructure::Rectangular,
-        bottom.as_ref().transpose(),
-        BlockStructure::Rectangular,
-        -1.0,
-        Par::Seq,
-    );
-    Ok(())
-}
-
-impl<T: Real> Finished<T> {
-    /// Takes the columns of the factor.
-    fn take(&mut self, width: usize, columns: &[f64]) {
-        let height = columns.len() / width;
-        self.columns.clear();
-        self.columns.extend(columns.iter().map(|&value| T::from_f64(value)));
-        self.inverse.clear();
-        self.inverse.resize(width * width, T::ZERO);
-        let columns = MatMut::from_column_major_slice_mut(&mut self.columns, height, width);
-        let (top, bottom) = columns.split_at_row_mut(width);
-        let mut inverse = MatMut::from_column_major_slice_mut(&mut self.inverse, width, width);
-        inverse.rb_mut().diagonal_mut().fill(T::from_f64(1.0));
-        triangular_solve::solve_lower_triangular_in_place(top.as_ref(), inverse, Par::Seq);
-        triangular_solve::solve_upper_triangular_in_place(
-            top.as_ref().transpose(),
-            bottom.transpose_mut(),
-            Par::Seq,
-        );
     }
 }
 

@@ -75,29 +75,23 @@ impl<T: Real> PackedFactor<T> {
         (self.widest, self.longest) = (0, 0);
     }
 
-    /// Adds a supernode whose columns begin with `start`: T^-1 and B T^-1, column after column, B in
-    /// `columns` below a square of the size of T, and the rows of B.
+    /// Adds a supernode of `width` columns from `start` on: P, column after column, and the rows of B.
     pub(super) fn push(
         &mut self,
         start: u32,
+        width: usize,
         rows: impl Iterator<Item = u32>,
-        inverse: &[T],
         columns: &[T],
     ) {
-        let width = inverse.len().isqrt();
         let row_count = columns.len() / width;
         let pattern_start = self.pattern.len() as u32;
         let panel_start = self.panels.len() as u32;
         self.pattern.extend(rows);
         for first in (0..row_count).step_by(ROWS) {
             let last = row_count.min(first + ROWS);
-            let top = first.min(width)..last.min(width);
-            let below = first.max(width).min(last)..last;
             for column in 0..width.min(first + ROWS) {
                 let mut panel = [T::ZERO; ROWS];
-                let (upper, lower) = panel[..last - first].split_at_mut(top.len());
-                upper.copy_from_slice(&inverse[column * width..][top.clone()]);
-                lower.copy_from_slice(&columns[column * row_count..][below.clone()]);
+                panel[..last - first].copy_from_slice(&columns[column * row_count..][first..last]);
                 self.panels.push(panel);
             }
         }

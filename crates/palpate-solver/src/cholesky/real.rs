@@ -1,12 +1,12 @@
 //! The two precisions that a factor is kept in.
 
-use std::ops::{Add, Sub};
+use std::ops::{Add, Sub, SubAssign};
 
 use pulp::Simd;
 
 /// A floating-point number and its vectors.
 pub(super) trait Real:
-    Copy + Default + PartialEq + Add<Output = Self> + Sub<Output = Self> + faer::traits::RealField
+    Copy + Default + PartialEq + Add<Output = Self> + Sub<Output = Self> + SubAssign
 {
     const ZERO: Self;
 
