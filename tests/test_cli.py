@@ -71,6 +71,9 @@ def test_help_names_every_command_and_version_prints_it():
     out, _ = run("--help")
     assert all(command in out for command in COMMANDS)
     assert run("--version")[0] == f"palpate {palpate.__version__}\n"
+    module = [sys.executable, "-m", "palpate", "--version"]
+    told = subprocess.run(module, capture_output=True, text=True, check=True).stdout
+    assert told == f"palpate {palpate.__version__}\n"
 
 
 def test_check_json_describes_every_body(two_boxes):

@@ -1,6 +1,7 @@
 """`palpate mesh`: tetrahedra from surfaces and from segmented images, and what is refused."""
 
 import json
+import re
 import sys
 
 import meshio
@@ -351,3 +352,4 @@ def test_long_bodies_are_asked_about_millimetres(tmp_path):
     palpate.write_mesh(tmp_path / "ball.stl", palpate.Mesh(points, triangles=triangles))
     out, _ = run("mesh", tmp_path / "ball.stl", tmp_path / "ball.vtk", "--edge-length", "40")
     assert "give --unit mm" in out
+    assert re.search(r"size +\d+(\.\d+)? x \d+(\.\d+)? x \d+(\.\d+)? m +\n", out)

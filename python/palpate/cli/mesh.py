@@ -194,7 +194,8 @@ def _joined(report: dict[str, Any]) -> str | None:
 
 def _print_report(path: str, made: Mesh, report: dict[str, Any], notes: list[str]) -> None:
     out = console()
-    size = " x ".join(f"{1e3 * each:.4g}" for each in report["extent"])
+    unit, metre = ("m", 1.0) if max(report["extent"]) >= 10 else ("mm", 1e3)
+    size = " x ".join(f"{metre * each:.4g}" for each in report["extent"])
     angle, shape, edge = report["dihedral_angle"], report["quality"], report["surface_edge"]
     change = report["volume"] / report["surface_volume"] - 1
     out.print(
@@ -205,10 +206,13 @@ def _print_report(path: str, made: Mesh, report: dict[str, Any], notes: list[str
                 ("nodes", whole(report["nodes"])),
                 ("tetrahedra", whole(report["tetrahedra"])),
                 ("surface triangles", whole(report["triangles"])),
-                ("size", f"{size} mm"),
+                ("size", f"{size} {unit}"),
                 ("volume", f"{volume_text(report['volume'])} ({100 * change:+.2f} %)"),
-                ("surface edges", f"{1e3 * edge['mean']:.3g} mm, shortest {1e3 * edge['min']:.3g}"),
-                ("farthest from the surface", f"{1e3 * report['deviation']:.2g} mm"),
+                (
+                    "surface edges",
+                    f"{metre * edge['mean']:.3g} {unit}, shortest {metre * edge['min']:.3g}",
+                ),
+                ("farthest from the surface", f"{metre * report['deviation']:.2g} {unit}"),
                 ("dihedral angles", f"{angle['min']:.1f}° to {angle['max']:.1f}°"),
                 ("shape (1 regular)", f"min {shape['min']:.2f}, median {shape['median']:.2f}"),
             ],
