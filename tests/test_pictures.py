@@ -246,6 +246,14 @@ def test_a_tilted_plane_has_no_crease_and_a_corner_has():
     assert across[64] < 0.8 < across[30]
 
 
+def test_facets_of_a_smooth_surface_have_no_creases():
+    camera = pictures.Camera(np.eye(3), (0.0, 0.0), 1.0, 1.0)
+    columns = np.linspace(0, 1, 128, dtype=np.float32)
+    facets = np.repeat(0.05 * np.abs(columns - 0.5)[None, :], 128, axis=0)
+    shade = surroundings_shade(facets.reshape(-1), camera, (128, 128), 1, (0, 0, 1))
+    assert np.allclose(shade.reshape(128, 128)[20:-20, 20:-20], 1)
+
+
 def test_a_body_casts_a_shadow_away_from_the_light():
     camera = pictures.Camera(np.eye(3), (0.0, 0.0), 1.0, 1.0)
     depth = np.zeros((128, 128), dtype=np.float32)

@@ -14,6 +14,8 @@ DepthMap = npt.NDArray[np.float32]
 #: Reach of the crease shade and length of the cast shadow, as fractions of the picture's height.
 _CREASE_REACH = 0.035
 _SHADOW_REACH = 0.5
+#: Rise over length, both sides together, below which a crease is one between facets of a smooth surface.
+_FACET = 0.12
 #: Share of the light that a full crease and a full shadow leave.
 _CREASE_LEFT = 0.45
 _SHADOW_LEFT = 0.66
@@ -96,7 +98,7 @@ def _crease(depth: DepthMap, pixel: float, reach: float) -> DepthMap:
             away = np.float32(length * pixel)
             there = _limited(_shifted(known, x, y) - known, away, reach)
             opposite = _limited(_shifted(known, -x, -y) - known, away, reach)
-            dark += np.clip((there + opposite) / away, 0, 1)
+            dark += np.clip((there + opposite) / away - _FACET, 0, 1)
     dark /= directions * len(rings)
     return np.asarray(1 - (1 - _CREASE_LEFT) * np.clip(2.2 * _blurred(dark), 0, 1), np.float32)
 
