@@ -29,6 +29,8 @@ pub(crate) type Include<'a> = &'a (dyn Fn(usize, usize) -> bool + Sync);
 #[derive(Debug, Default)]
 pub(crate) struct PenetrationSearch {
     pairs: Vec<(u32, u32)>,
+    /// Per body, whether it crosses itself.
+    folded: Vec<bool>,
     crossing: Intersections,
     workers: Vec<Worker>,
 }
@@ -52,7 +54,7 @@ impl PenetrationSearch {
         found: &mut Penetration,
     ) {
         let start = Instant::now();
-        let Self { pairs, crossing, workers } = self;
+        let Self { pairs, folded, crossing, workers } = self;
         pairs.clear();
         let visited = frame.upper.pairs(pairs);
         let closed = |body: u32| frame.bodies[body as usize].surface.closed;
@@ -74,11 +76,20 @@ impl PenetrationSearch {
             let mut options =
                 IntersectionOptions { self_contact, same_leaf: true, shared_nodes: false };
             detector.intersections(frame, options, crossing);
-            // Triangles that share nodes cost much more, and only go on where others cross.
-            if crossing.pairs.iter().any(|pair| pair.body_a == pair.body_b) {
+            // Triangles that share nodes cost much more, and only matter in a body where others cross.
+            folded.clear();
+            folded.resize(frame.bodies.len(), false);
+            for pair in crossing.pairs.iter().filter(|pair| pair.body_a == pair.body_b) {
+                folded[pair.body_a as usize] = true;
+            }
+            if folded.contains(&true) {
                 crossing.pairs.clear();
                 options.shared_nodes = true;
                 detector.intersections(frame, options, crossing);
+                let matters = |pair: &TrianglePair| {
+                    pair.body_a != pair.body_b || folded[pair.body_a as usize]
+                };
+                crossing.pairs.retain(matters);
             }
         }
         found.stats = crossing.stats;
@@ -87,7 +98,10 @@ impl PenetrationSearch {
         found.stats.object_time += start.elapsed().saturating_sub(crossing.stats.total_time());
 
         let start = Instant::now();
-        crossing.pairs.sort_unstable_by_key(bodies_of);
+        // By triangles too: what is found of two bodies does not depend on those beside them.
+        crossing
+            .pairs
+            .sort_unstable_by_key(|pair| (bodies_of(pair), pair.triangle_a, pair.triangle_b));
         let threaded = frame.pool.is_some();
         let count = if threaded { pairs.len() } else { 1 };
         workers.resize_with(workers.len().max(count), Worker::default);
@@ -139,7 +153,7 @@ impl Worker {
                 return;
             }
             let triangles = crossing.iter().flat_map(|pair| [pair.triangle_a, pair.triangle_b]);
-            inside_a.locate(body_a, triangles, |node| {
+            inside_a.locate_own(body_a, triangles, |node| {
                 cost.polygon_tests += 1;
                 surfaces.is_covered(a, node)
             });
@@ -156,7 +170,7 @@ impl Worker {
                 |pair: &TrianglePair| if of_a { pair.triangle_a } else { pair.triangle_b };
             inside.locate(body, crossing.iter().map(triangle), |node| {
                 cost.polygon_tests += 1;
-                Some(surfaces.is_inside(into, &body.positions[node as usize]))
+                surfaces.is_inside(into, &body.positions[node as usize])
             });
         };
         locate(inside_a, [a, b], true);

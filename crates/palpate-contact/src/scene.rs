@@ -403,9 +403,10 @@ impl Scene {
     ///
     /// `include(body, into_body)` is asked for ordered pairs, a body with itself included. Inside another
     /// body is where its surface's winding number is not zero; inside its own, where tetrahedra that do
-    /// not have the node cover it (counted with their orientation). Both are decided exactly; the second
-    /// only in a body where two surface triangles without a common node meet, and next to where its
-    /// surface meets itself, so that where tetrahedra are turned over nodes may be missed.
+    /// not have the node cover it (counted with their orientation). Both are decided exactly, node by node;
+    /// the second only in a body where two surface triangles without a common node meet, or whose surface
+    /// is in several parts. A node of a tetrahedron that is turned over goes with those around it. What is
+    /// found of two bodies does not depend on others.
     ///
     /// A node leaves through the closest point of the contact patch: the triangles of `into_body` that
     /// cross `body` or have a node inside it, and that face the node. Where there is no such patch (open

@@ -1,8 +1,10 @@
-//! Which surface nodes are inside.
+//! Which surface nodes are inside another body (`own.rs`: their own).
 //!
 //! Only crossing triangles change the side: what the others connect is inside as a whole, or outside. So
 //! one point decides for each connected part next to crossing triangles, and for each component of the
 //! surface that has none.
+
+mod own;
 
 use crate::scene::SceneBody;
 
@@ -11,7 +13,7 @@ use crate::scene::SceneBody;
 enum Side {
     /// Not located, and no matter unless its neighbours turn out to be inside.
     Unknown,
-    /// Of a crossing triangle, not located yet.
+    /// Of a crossing triangle, not located yet; in its own body, a node that cannot be located.
     Border,
     Inside,
     Outside,
@@ -27,11 +29,14 @@ pub(super) struct Inside {
     component_crosses: Vec<bool>,
     border: Vec<u32>,
     pending: Vec<u32>,
-    /// Nodes inside, of components that cross; sorted.
+    /// Nodes inside, of components that cross, or of which only a part is inside; sorted.
     pub(super) nodes: Vec<u32>,
     /// (component, node) of those that do not cross, all inside; sorted.
     pub(super) swallowed: Vec<(u32, u32)>,
     patch: Vec<bool>,
+    /// By triangle, whether its part of the surface was collected; for nodes inside their own body.
+    seen: Vec<bool>,
+    part: Vec<u32>,
 }
 
 impl Inside {
@@ -44,14 +49,34 @@ impl Inside {
         self.patch[triangle as usize]
     }
 
-    /// Locates the nodes of `body`, given its crossing triangles, some of them several times. A node
-    /// for which `is_inside` does not know leaves it to the others that it is connected with.
+    /// Locates the nodes of `body` in another, given its crossing triangles, some of them several times.
     pub(super) fn locate(
         &mut self,
         body: &SceneBody,
         crossing: impl Iterator<Item = u32>,
-        mut is_inside: impl FnMut(u32) -> Option<bool>,
+        mut is_inside: impl FnMut(u32) -> bool,
     ) {
+        self.begin(body, crossing);
+        for index in 0..self.border.len() {
+            let node = self.border[index];
+            if self.sides[node as usize] == Side::Border {
+                let side = if is_inside(node) { Side::Inside } else { Side::Outside };
+                self.spread(body, node, side);
+            }
+        }
+        for &node in &body.surface.component_nodes {
+            if !self.component_crosses[node as usize] && is_inside(node) {
+                let before = self.nodes.len();
+                self.spread(body, node, Side::Inside);
+                self.swallowed.extend(self.nodes.drain(before..).map(|inside| (node, inside)));
+            }
+        }
+        self.nodes.sort_unstable();
+        self.swallowed.sort_unstable();
+    }
+
+    /// Forgets everything and takes in the crossing triangles.
+    fn begin(&mut self, body: &SceneBody, crossing: impl Iterator<Item = u32>) {
         let (triangles, surface) = (body.mesh.triangles(), &body.surface);
         let node_count = body.mesh.nodes().len();
         reset(&mut self.sides, node_count, Side::Unknown);
@@ -73,23 +98,6 @@ impl Inside {
                 }
             }
         }
-        for index in 0..self.border.len() {
-            let node = self.border[index];
-            if self.sides[node as usize] == Side::Border
-                && let Some(inside) = is_inside(node)
-            {
-                self.spread(body, node, if inside { Side::Inside } else { Side::Outside });
-            }
-        }
-        for &node in &surface.component_nodes {
-            if !self.component_crosses[node as usize] && is_inside(node) == Some(true) {
-                let before = self.nodes.len();
-                self.spread(body, node, Side::Inside);
-                self.swallowed.extend(self.nodes.drain(before..).map(|inside| (node, inside)));
-            }
-        }
-        self.nodes.sort_unstable();
-        self.swallowed.sort_unstable();
     }
 
     /// Gives `side` to all that triangles which do not cross connect with `start`; outside no further

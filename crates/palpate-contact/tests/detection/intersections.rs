@@ -26,7 +26,7 @@ pub(crate) fn validate(scene: &Scene) {
 }
 
 /// Every pair of triangles that meet, by the exact tests alone; those that share nodes as well.
-fn brute_force(meshes: &[Arc<Mesh>], positions: &Positions) -> Vec<TrianglePair> {
+pub(crate) fn brute_force(meshes: &[Arc<Mesh>], positions: &Positions) -> Vec<TrianglePair> {
     let mut all = Vec::new();
     for (body, mesh) in meshes.iter().enumerate() {
         for (triangle, nodes) in mesh.triangles().iter().enumerate() {
@@ -65,7 +65,7 @@ fn brute_force(meshes: &[Arc<Mesh>], positions: &Positions) -> Vec<TrianglePair>
     pairs
 }
 
-fn share_nodes(meshes: &[Arc<Mesh>], pair: &TrianglePair) -> bool {
+pub(crate) fn share_nodes(meshes: &[Arc<Mesh>], pair: &TrianglePair) -> bool {
     let [a, b] = [(pair.body_a, pair.triangle_a), (pair.body_b, pair.triangle_b)]
         .map(|(body, triangle)| meshes[body as usize].triangles()[triangle as usize]);
     pair.body_a == pair.body_b && a.iter().any(|node| b.contains(node))

@@ -10,4 +10,5 @@ mod points;
 mod proximity;
 mod scene;
 mod scenes;
+mod slits;
 mod tree;

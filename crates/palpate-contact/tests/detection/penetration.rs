@@ -7,7 +7,7 @@ use palpate_geometry::{Point, point_triangle, predicates, triangles_intersect, v
 use palpate_model::Mesh;
 use proptest::prelude::*;
 
-use crate::intersections::scene;
+use crate::intersections::{brute_force as brute_force_pairs, scene, share_nodes};
 use crate::scenes::{
     Case, Random, as_slices, block, block_data, cases, deforming, jittered, sheet, soup,
 };
@@ -82,7 +82,7 @@ fn closest(
 }
 
 /// Whether every tetrahedron is positive.
-fn is_solid(scene: &Scene, body: usize) -> bool {
+pub(crate) fn is_solid(scene: &Scene, body: usize) -> bool {
     !scene.mesh(body).tetrahedra().is_empty()
         && tetrahedra(scene, body).all(|corners| is_positive(&corners))
 }
@@ -104,17 +104,27 @@ fn is_inside(scene: &Scene, [body, into]: [usize; 2], node: u32) -> bool {
     }
 }
 
-/// Per triangle of `body`, whether it meets one of `other`; of the same body, one without a common node.
+/// Per triangle of `body`, whether it meets one of `other`.
 fn crossing(scene: &Scene, body: usize, other: usize) -> Vec<bool> {
-    let meshes = [body, other].map(|index| scene.mesh(index).triangles());
-    let one = |(triangle, corners): (usize, [Point; 3])| {
-        surface(scene, other).enumerate().any(|(index, others)| {
-            let shared =
-                body == other && meshes[0][triangle].iter().any(|n| meshes[1][index].contains(n));
-            !shared && triangles_intersect(&corners, &others)
-        })
-    };
-    surface(scene, body).enumerate().map(one).collect()
+    if body == other {
+        return crossing_itself(scene, body);
+    }
+    let one = |corners| surface(scene, other).any(|others| triangles_intersect(&corners, &others));
+    surface(scene, body).map(one).collect()
+}
+
+/// Per triangle of `body`, whether it meets another of it; none does unless two without a common node meet.
+fn crossing_itself(scene: &Scene, body: usize) -> Vec<bool> {
+    let meshes = [Arc::clone(scene.mesh(body))];
+    let pairs = brute_force_pairs(&meshes, &vec![scene.positions(body).to_vec()]);
+    let mut crosses = vec![false; meshes[0].triangles().len()];
+    if !pairs.iter().all(|pair| share_nodes(&meshes, pair)) {
+        for pair in pairs {
+            crosses[pair.triangle_a as usize] = true;
+            crosses[pair.triangle_b as usize] = true;
+        }
+    }
+    crosses
 }
 
 /// Per node, the smallest node that triangles connect it with.
@@ -132,6 +142,20 @@ fn components(scene: &Scene, body: usize) -> Vec<u32> {
             return labels;
         }
     }
+}
+
+/// Parts of a surface, by label, that do not leave as a whole: some of their triangles cross, or not all of
+/// their nodes are inside.
+fn not_swallowed(
+    labels: &[u32],
+    triangles: &[[u32; 3]],
+    crosses: &[bool],
+    inner: &[u32],
+) -> Vec<u32> {
+    let stays = |nodes: &[u32; 3]| nodes.iter().any(|node| !inner.contains(node));
+    let crossed =
+        triangles.iter().zip(crosses).filter(|&(nodes, &crosses)| crosses || stays(nodes));
+    crossed.map(|(nodes, _)| labels[nodes[0] as usize]).collect()
 }
 
 /// A record, or for a node of a component that is swallowed the direction it must have.
@@ -168,10 +192,14 @@ fn brute_force(
             nodes.filter(|&node| is_inside(scene, [body, into], node)).collect()
         };
         let inner = of([body, into]);
-        if inner.is_empty() {
+        let crosses = crossing(scene, body, into);
+        let labels = components(scene, body);
+        let surface_nodes = scene.mesh(body).surface_nodes();
+        let is_connected =
+            surface_nodes.iter().all(|&node| labels[node as usize] == surface_nodes[0]);
+        if inner.is_empty() || (body == into && is_connected && !crosses.contains(&true)) {
             continue;
         }
-        let crosses = crossing(scene, body, into);
         let mut patch = crossing(scene, into, body);
         if is_closed[body] {
             let behind = of([into, body]);
@@ -179,12 +207,8 @@ fn brute_force(
                 patch[triangle] |= nodes.iter().any(|node| behind.contains(node));
             }
         }
-        let labels = components(scene, body);
         let triangles = scene.mesh(body).triangles();
-        let crossed: Vec<u32> = (0..triangles.len())
-            .filter(|&triangle| crosses[triangle])
-            .map(|triangle| labels[triangles[triangle][0] as usize])
-            .collect();
+        let crossed = not_swallowed(&labels, triangles, &crosses, &inner);
         let is_elsewhere = |triangle: usize, label: u32| {
             body != into || labels[scene.mesh(into).triangles()[triangle][0] as usize] != label
         };
@@ -286,7 +310,7 @@ fn every_way() -> impl Iterator<Item = SceneOptions> {
 
 /// Compares all methods with each other and with the twin, each body with itself too where its
 /// tetrahedra are positive. Returns how many nodes are inside.
-fn check(case: &Case, is_closed: &[bool]) -> usize {
+pub(crate) fn check(case: &Case, is_closed: &[bool]) -> usize {
     let mut count = 0;
     for frame in &case.frames {
         let mut first: Option<Vec<PenetratingNode>> = None;
