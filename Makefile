@@ -1,4 +1,4 @@
-# The only entry: everything a fresh clone needs is Rust, Python 3.10+ and make.
+# The only entry: everything a fresh clone needs is Rust, Python 3.10+, make and a C compiler.
 
 PYTHON ?= python3
 VENV := .venv
