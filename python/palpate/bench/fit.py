@@ -41,7 +41,7 @@ def fit_line(stage: str, term: str, terms: npt.ArrayLike, seconds: npt.ArrayLike
     scale = float(np.abs(x).max())
     columns = np.stack([x / scale / y, 1 / y], axis=1)
     # Not negative: the best of both together, each alone, and neither.
-    choices = [np.linalg.lstsq(columns, np.ones(len(y)))[0]]
+    choices = [np.linalg.lstsq(columns, np.ones(len(y)), rcond=None)[0]]
     for column in range(2):
         alone = np.zeros(2)
         alone[column] = columns[:, column].sum() / np.sum(columns[:, column] ** 2)
