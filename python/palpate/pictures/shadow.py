@@ -14,7 +14,7 @@ DepthMap = npt.NDArray[np.float32]
 #: Reach of the crease shade and length of the cast shadow, as fractions of the picture's height.
 _CREASE_REACH = 0.035
 _SHADOW_REACH = 0.5
-#: Rise over length, both sides together, below which a crease is one between facets of a smooth surface.
+#: Rise over length, both sides together, that facets of a smooth surface may have.
 _FACET = 0.12
 #: Share of the light that a full crease and a full shadow leave.
 _CREASE_LEFT = 0.45
