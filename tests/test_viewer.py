@@ -1,6 +1,7 @@
 """The viewer: its protocol, its session without a browser, its server against strangers."""
 
 import json
+import os
 import re
 import signal
 import socket
@@ -775,5 +776,30 @@ def test_the_command_serves_until_ctrl_c(tmp_path):
                 assert "nothing.seg" in read(page, "problem")[0]["text"]
             process.send_signal(signal.SIGINT)
             assert process.wait(20) == 0
+        finally:
+            process.kill()
+
+
+def test_where_the_page_is_and_that_no_browser_was_found_are_told(tmp_path):
+    # A thread that sends stdout to stderr, as reading a mesh does, must not catch the address.
+    start = (
+        "import contextlib, sys, palpate.cli.view, palpate.viewer.session as session\n"
+        "from palpate.cli import main\n"
+        "redirected = contextlib.redirect_stdout(sys.stderr)\n"
+        "session.Session.start = lambda self: redirected.__enter__()\n"
+        "main()"
+    )
+    command = [sys.executable, "-c", start, "view", "small", "--port", "0"]
+    # Neither a program of that name nor a screen.
+    bare = {name: value for name, value in os.environ.items() if "DISPLAY" not in name}
+    bare |= {"PATH": str(tmp_path), "BROWSER": "none-of-that-name"}
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    with subprocess.Popen(command, **pipes, text=True, env=bare) as process:
+        try:
+            assert "no browser was found here" in process.stderr.readline()
+            process.send_signal(signal.SIGINT)
+            assert process.wait(20) == 0
+            assert process.stdout.read().startswith("small at http://127.0.0.1:")
+            assert process.stderr.read() == ""
         finally:
             process.kill()

@@ -99,13 +99,17 @@ def command(
         return
     title = "" if recorded else path.stem
     watch = path if path.suffix == ".bml" else None
-    with Viewer(
-        open_player, host=host, port=port, title=title, play=not paused, watch=watch
-    ) as viewer:
+    # Now: a mesh that is read in the session's thread sends stdout elsewhere meanwhile.
+    out, notes = console(), console(error=True)
+    with (
+        Viewer(
+            open_player, host=host, port=port, title=title, play=not paused, watch=watch
+        ) as viewer,
+        contextlib.suppress(KeyboardInterrupt),
+    ):
         if host not in ("127.0.0.1", "localhost", "::1"):
-            console(error=True).print("note: everyone who reaches this address can use the page")
-        console().print(f"{target} at {viewer.url} (Ctrl-C ends it)")
-        if not no_browser:
-            viewer.open_browser()
-        with contextlib.suppress(KeyboardInterrupt):
-            viewer.wait()
+            notes.print("note: everyone who reaches this address can use the page")
+        out.print(f"{target} at {viewer.url} (Ctrl-C ends it)")
+        if not no_browser and not viewer.open_browser():
+            notes.print("note: no browser was found here; open the address in one")
+        viewer.wait()
