@@ -109,6 +109,8 @@ def test_a_label_becomes_a_mesh_in_its_place(tmp_path):
     assert np.abs(away - 0.014).max() < 0.0015  # voxels are 1 x 1 x 2.5 mm
 
 
+# From Python 3.12 on it warns of how pynrrd writes the time.
+@pytest.mark.filterwarnings("ignore:datetime.datetime.utcnow:DeprecationWarning")
 @pytest.mark.parametrize(
     ("space", "signs"),
     [
