@@ -129,6 +129,19 @@ def test_a_scene_keeps_its_tree_through_cuts():
     assert len(change.tetrahedra) == len(scene.meshes[0].tetrahedra)
 
 
+def test_a_scene_goes_on_with_a_cut_as_a_simulation_does(simulation):
+    scene = palpate.Scene([simulation.model.bodies[0]])
+    for step in range(55):
+        edges = [[[0.033, y, -0.1], [0.036, y, 0.2]] for y in 0.0013 * np.array([step, step + 1])]
+        blade = palpate.Blade.stroke(edges)
+        simulation.cut(blade)
+        scene.cut(blade)
+    mesh = scene.meshes[0]
+    assert mesh.tetrahedra.tolist() == simulation.model.bodies[0].mesh.tetrahedra.tolist()
+    assert mesh.nodes.tolist() == simulation.model.bodies[0].mesh.nodes.tolist()
+    assert len(simulation.separate()) == 3  # the plate and two pieces
+
+
 def test_blades():
     square = palpate.Blade.plane([0, 0, 0], [0, 0, 2.0], size=0.5)
     assert square.points.shape == (4, 3)

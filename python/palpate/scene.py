@@ -141,6 +141,8 @@ class Scene:
     ) -> tuple[BodyCut, ...]:
         """Cut bodies of tetrahedra along a blade, where they are now.
 
+        A blade may come in steps as short as one likes: faces that it reaches without opening
+        them are remembered, until the body is changed otherwise; ``cut_area`` is then 0.
         The bounding trees are kept: tetrahedra stay in their leaves, parts of one in its leaf.
         Ignored pairs stay ignored; groups stay with what is left of a surface triangle, and new
         surface is in none.

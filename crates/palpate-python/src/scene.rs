@@ -7,9 +7,8 @@ use std::time::Duration;
 
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2};
 use palpate::contact::{IntersectionOptions, Method, ProximityOptions, Split};
-use palpate::cutting::cut;
 use palpate::geometry::{Aabb, Point};
-use palpate::{Scene, SceneError, SceneOptions};
+use palpate::{Scene, SceneCuts, SceneError, SceneOptions};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
@@ -37,6 +36,7 @@ pub(crate) struct PyScene {
 /// What the lock guards.
 pub(crate) struct Inside {
     scene: Scene,
+    cuts: SceneCuts,
     update_time: Duration,
     /// Memory for copies of positions.
     given: Vec<Vec<Point>>,
@@ -73,7 +73,12 @@ impl PyScene {
         let meshes = meshes.iter().map(|mesh| mesh.mesh.clone()).collect();
         let scene = raise(py, py.detach(|| Scene::new(meshes, structure.as_ref(), options)))?;
         Ok(Self {
-            inside: Held::new(Inside { scene, update_time: Duration::ZERO, given: Vec::new() }),
+            inside: Held::new(Inside {
+                scene,
+                cuts: SceneCuts::default(),
+                update_time: Duration::ZERO,
+                given: Vec::new(),
+            }),
         })
     }
 
@@ -104,25 +109,10 @@ impl PyScene {
         let options = cutting::options(options);
         let cuts = py.detach(|| {
             let mut guard = self.inside.lock();
-            let mut cuts = Vec::new();
-            for &body in &bodies {
-                guard.check(body).map_err(|error| error.to_string())?;
-            }
-            let scene = &mut guard.scene;
-            for body in bodies {
-                let found = cut(scene.mesh(body), scene.positions(body), &blade.blade, &options);
-                let named = |error| format!("body {body} cannot be cut: {error}");
-                if let Some(found) = found.map_err(named)? {
-                    cuts.push((body, found));
-                }
-            }
-            for (body, found) in &cuts {
-                let changed = scene.change_body(*body, &found.change);
-                changed.map_err(|error| error.to_string())?;
-            }
-            Ok(cuts)
+            let Inside { scene, cuts, .. } = &mut *guard;
+            cuts.cut(scene, &bodies, &blade.blade, &options)
         });
-        let rows = cuts.map_err(|message: String| PyValueError::new_err(message))?;
+        let rows = cuts.map_err(|error| PyValueError::new_err(error.to_string()))?;
         rows.iter()
             .map(|(body, found)| {
                 Ok((*body, change_columns(py, &found.change)?, report_row(py, &found.report)?))

@@ -14,6 +14,7 @@
 //! ```
 
 mod checkpoint;
+mod scene_cuts;
 mod simulation;
 mod tool_loop;
 
@@ -27,6 +28,7 @@ pub use palpate_model as model;
 pub use palpate_contact::{Scene, SceneError, SceneOptions};
 pub use palpate_cutting::{Blade, CutOptions};
 pub use palpate_model::{CoreLoader, Mesh, MeshData, Model, ModelError, load_model};
+pub use scene_cuts::{SceneCutError, SceneCuts};
 pub use simulation::{
     BodyChange, ChangeReport, ChangeTimes, Simulation, SimulationError, SimulationOptions,
     Snapshot, StepReport, StepTimes, Substeps,

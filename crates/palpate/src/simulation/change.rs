@@ -4,11 +4,12 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use palpate_contact::{Scene, SceneOptions};
-use palpate_cutting::{Blade, CutOptions, CutReport, cut_on};
+use palpate_cutting::{Blade, CutOptions, CutReport};
 use palpate_mechanics::{Dynamics, DynamicsOptions, State};
 use palpate_model::{MeshChange, Model};
 
 use super::{Simulation, SimulationError, SimulationOptions};
+use crate::scene_cuts::{BodyToCut, cut_bodies};
 
 /// What a cut or a removal did to one body.
 #[derive(Clone, Debug)]
@@ -85,22 +86,23 @@ impl Simulation {
         options: &CutOptions,
     ) -> Result<ChangeReport, SimulationError> {
         let start = Instant::now();
-        let mut changes = Vec::new();
         let mut pending = self.pending.clone();
         pending.resize(self.model.bodies.len(), Vec::new());
-        for (body, described) in self.model.bodies.iter().enumerate() {
-            if described.rigid.is_some() {
-                continue;
-            }
-            let positions = self.dynamics.positions(body);
-            let options = CutOptions { min_edge: Some(self.min_edge(body, options)), ..*options };
-            let found = cut_on(&described.mesh, positions, blade, &pending[body], &options)
-                .map_err(|source| SimulationError::Cut { body, source })?;
-            if let Some(found) = found {
-                pending[body] = found.pending;
-                let (change, report) = (found.change, Some(found.report));
-                changes.push(BodyChange { body, change, report, released: Vec::new() });
-            }
+        let deformable = |body: &usize| self.model.bodies[*body].rigid.is_none();
+        let bodies = (0..self.model.bodies.len()).filter(deformable).map(|body| BodyToCut {
+            body,
+            mesh: &self.model.bodies[body].mesh,
+            positions: self.dynamics.positions(body),
+            pending: &pending[body],
+            min_edge: self.min_edge(body, options),
+        });
+        let cuts = cut_bodies(bodies, blade, options)
+            .map_err(|(body, source)| SimulationError::Cut { body, source })?;
+        let mut changes = Vec::new();
+        for (body, found) in cuts {
+            pending[body] = found.pending;
+            let (change, report) = (found.change, Some(found.report));
+            changes.push(BodyChange { body, change, report, released: Vec::new() });
         }
         let report = self.apply(changes, start)?;
         self.pending = pending;
