@@ -39,6 +39,7 @@ mod proximity;
 pub mod scene;
 mod simd;
 mod surface;
+pub mod threads;
 mod upper_tree;
 mod wide;
 
@@ -49,3 +50,4 @@ pub use scene::{
     ContactNodes, DetectionMemory, DetectionStats, IntersectionOptions, Intersections, Method,
     Penetration, Proximity, ProximityOptions, Scene, SceneError, SceneOptions, UpdateStats,
 };
+pub use threads::Threads;

@@ -13,8 +13,8 @@ use std::time::Instant;
 
 use palpate_geometry::{Aabb, Point};
 use palpate_model::{Mesh, Structure};
+use rayon::ThreadPool;
 use rayon::prelude::*;
-use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::bounding_tree::{BoundingTree, corner_points};
 use crate::left_out::{CommonGroups, Groups, IgnoredPairs};
@@ -23,6 +23,7 @@ use crate::penetration::PenetrationSearch;
 use crate::points::SurfacePoint;
 use crate::proximity::Limit;
 use crate::surface::Surface;
+use crate::threads::Threads;
 use crate::upper_tree::UpperTree;
 
 pub use crate::method::Method;
@@ -131,7 +132,7 @@ pub struct Scene {
     upper: UpperTree,
     ignored: IgnoredPairs,
     options: SceneOptions,
-    pool: Option<ThreadPool>,
+    threads: Threads,
     detector: Box<dyn Detector>,
     penetration_search: PenetrationSearch,
     intersections: Intersections,
@@ -162,7 +163,7 @@ impl Scene {
         if options.leaf_size == 0 {
             return Err(SceneError::LeafSize);
         }
-        let pool = start_threads(options.threads)?;
+        let threads = Threads::new(options.threads)?;
         let upper = if let Some(structure) = structure {
             UpperTree::from_structure(structure, meshes.len())?
         } else {
@@ -175,7 +176,7 @@ impl Scene {
             upper,
             ignored: IgnoredPairs::default(),
             options,
-            pool,
+            threads,
             detector: options.method.detector(),
             penetration_search: PenetrationSearch::default(),
             intersections: Intersections::default(),
@@ -286,10 +287,15 @@ impl Scene {
     /// # Errors
     /// If they could not be started.
     pub fn restart_threads(&mut self) -> Result<(), SceneError> {
-        let gone = std::mem::replace(&mut self.pool, start_threads(self.options.threads)?);
+        let gone = std::mem::replace(&mut self.threads, Threads::new(self.options.threads)?);
         // Its end would be waited for in vain.
         std::mem::forget(gone);
         Ok(())
+    }
+
+    /// Its threads, for others that work on the same step.
+    pub fn threads(&self) -> &Threads {
+        &self.threads
     }
 
     /// How the scene was built.
@@ -330,7 +336,7 @@ impl Scene {
                 body.tree();
             }
         };
-        if let Some(pool) = &self.pool {
+        if let Some(pool) = self.threads.pool() {
             pool.install(|| self.bodies.par_iter_mut().enumerate().for_each(move_body));
         } else {
             self.bodies.iter_mut().enumerate().for_each(move_body);
@@ -347,7 +353,7 @@ impl Scene {
             upper: &self.upper,
             ignored: &self.ignored,
             with_groups: true,
-            pool: self.pool.as_ref(),
+            pool: self.threads.pool(),
         };
         self.intersections.pairs.clear();
         self.intersections.stats = DetectionStats::default();
@@ -385,7 +391,7 @@ impl Scene {
             upper: &self.upper,
             ignored: &self.ignored,
             with_groups: true,
-            pool: self.pool.as_ref(),
+            pool: self.threads.pool(),
         };
         self.proximity.pairs.clear();
         self.proximity.stats = DetectionStats::default();
@@ -423,7 +429,7 @@ impl Scene {
             upper: &self.upper,
             ignored: &self.ignored,
             with_groups: false,
-            pool: self.pool.as_ref(),
+            pool: self.threads.pool(),
         };
         self.penetration.nodes.clear();
         self.penetration.stats = DetectionStats::default();
@@ -439,8 +445,8 @@ impl Scene {
 
     /// Refits what the method searches and the upper tree; returns the number of tree nodes.
     fn bodies_moved(&mut self) -> u64 {
-        let Self { bodies, detector, upper, pool, .. } = self;
-        let blocks_refitted = detector.bodies_moved(bodies, pool.as_ref());
+        let Self { bodies, detector, upper, threads, .. } = self;
+        let blocks_refitted = detector.bodies_moved(bodies, threads.pool());
         upper.refit(|body| {
             let bounds = detector.bounds(body);
             bounds.unwrap_or_else(|| bodies[body].tree().bounds())
@@ -473,21 +479,10 @@ impl Scene {
             Some(SceneError::NotFinite { body, node, position: given[node] })
         };
         let bodies = 0..self.bodies.len();
-        let first = match &self.pool {
+        let first = match self.threads.pool() {
             Some(pool) => pool.install(|| bodies.into_par_iter().find_map_first(broken)),
             None => bodies.into_iter().find_map(broken),
         };
         first.map_or(Ok(()), Err)
-    }
-}
-
-fn start_threads(threads: usize) -> Result<Option<ThreadPool>, SceneError> {
-    match threads {
-        0 => Err(SceneError::Threads),
-        1 => Ok(None),
-        _ => match ThreadPoolBuilder::new().num_threads(threads).build() {
-            Ok(pool) => Ok(Some(pool)),
-            Err(error) => Err(SceneError::ThreadPool { threads, reason: error.to_string() }),
-        },
     }
 }

@@ -11,14 +11,14 @@ use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
-use palpate_contact::{PenetratingNode, ProximityPair};
+use palpate_contact::{PenetratingNode, ProximityPair, Threads};
 use palpate_geometry::Point;
 use palpate_model::Model;
 use palpate_solver::FactorStats;
 use rayon::prelude::*;
 
 use crate::body::{BodyKind, Known, MovingBody, first_not_finite};
-use crate::contact::filter::{BodyView, Candidate};
+use crate::contact::filter::{BodyView, Candidate, Detected};
 use crate::contact::response::Response;
 use crate::contact::{Contact, ContactParameters, Surface};
 use crate::energy::{Energy, Momentum};
@@ -118,7 +118,7 @@ pub struct StepStats {
 /// ```
 pub struct Dynamics {
     options: DynamicsOptions,
-    pool: Option<rayon::ThreadPool>,
+    threads: Threads,
     /// Bodies by the task that steps them, and where each body is.
     tasks: Vec<Vec<MovingBody>>,
     places: Vec<(u32, u32)>,
@@ -175,18 +175,19 @@ impl Dynamics {
         if !(time_step.is_finite() && time_step > 0.0) {
             return Err(MechanicsError::TimeStep(time_step));
         }
-        let pool = start_threads(options.threads)?;
+        let threads = Threads::new(options.threads.max(1));
+        let threads = threads.map_err(|error| MechanicsError::Threads(error.to_string()))?;
         let make = |index: usize| {
             MovingBody::new(index, &model.bodies[index], model.gravity, time_step, known(index))
         };
-        Self::with_bodies(model, options, pool, make)
+        Self::with_bodies(model, options, threads, make)
     }
 
     /// Of bodies that `make` gives.
     fn with_bodies(
         model: &Model,
         options: DynamicsOptions,
-        pool: Option<rayon::ThreadPool>,
+        threads: Threads,
         mut make: impl FnMut(usize) -> Result<MovingBody, MechanicsError>,
     ) -> Result<Self, MechanicsError> {
         if !model.gravity.iter().all(|g| g.is_finite()) {
@@ -210,7 +211,7 @@ impl Dynamics {
         attach(&mut ties, model, &parameters, &surfaces);
         let mut dynamics = Self {
             options,
-            pool,
+            threads,
             tasks: Vec::new(),
             places,
             response: Response::new(ties.attached_nodes()),
@@ -247,16 +248,9 @@ impl Dynamics {
         bodies
     }
 
-    /// Starts the threads anew: a process that was forked has none of its parent's.
-    ///
-    /// # Errors
-    /// If they could not be started.
-    pub fn restart_threads(&mut self) -> Result<(), MechanicsError> {
-        if let Some(pool) = start_threads(self.options.threads)? {
-            // The end of those that are gone would be waited for in vain.
-            std::mem::forget(self.pool.replace(pool));
-        }
-        Ok(())
+    /// Works on these threads from now on; how bodies are divided among them stays as it is.
+    pub fn share_threads(&mut self, threads: &Threads) {
+        self.threads = threads.clone();
     }
 
     /// How the bodies are stepped.
@@ -286,7 +280,7 @@ impl Dynamics {
                 work(body.index, body);
             }
         };
-        match &self.pool {
+        match self.threads.pool() {
             Some(pool) => pool.install(|| self.tasks.par_iter_mut().for_each(run)),
             None => self.tasks.iter_mut().for_each(run),
         }
@@ -381,10 +375,10 @@ impl Dynamics {
         let start = Instant::now();
         response.begin(|candidates| self.add_ties(candidates));
         response.find(
-            proximity,
-            penetration,
+            Detected { proximity, penetration },
             self.body_count(),
             time_step,
+            self.threads.pool(),
             |body| self.body(body),
             |body| BodyView {
                 surface: &self.surfaces[body],
@@ -471,7 +465,7 @@ impl Dynamics {
         stats.times.compliance += start.elapsed();
 
         let start = Instant::now();
-        let cost = response.solve(self.pool.as_ref(), |body| self.body(body));
+        let cost = response.solve(self.threads.pool(), |body| self.body(body));
         stats.iterations += cost.changes;
         stats.contact_solves += 1;
         stats.residual = cost.residual;
@@ -723,14 +717,6 @@ impl Dynamics {
     pub fn factor_stats(&self, body: usize) -> Option<FactorStats> {
         self.body(body).elastic().map(crate::body::ElasticBody::factor_stats)
     }
-}
-
-fn start_threads(threads: usize) -> Result<Option<rayon::ThreadPool>, MechanicsError> {
-    if threads <= 1 {
-        return Ok(None);
-    }
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-    pool.map(Some).map_err(|error| MechanicsError::Threads(error.to_string()))
 }
 
 /// Ties what the model attaches.

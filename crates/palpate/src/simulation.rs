@@ -251,6 +251,11 @@ impl Simulation {
 
     /// One step of the dynamics, `left` of which are left in which targets are reached.
     fn advance(&mut self, left: u32) -> Result<StepReport, SimulationError> {
+        let threads = self.scene.threads().clone();
+        threads.run(|| self.advance_here(left))
+    }
+
+    fn advance_here(&mut self, left: u32) -> Result<StepReport, SimulationError> {
         let start = Instant::now();
         let mut times = StepTimes::default();
         self.scene()?;
@@ -434,10 +439,11 @@ impl Simulation {
     fn of_parts(
         model: Arc<Model>,
         options: SimulationOptions,
-        (scene, dynamics): (Scene, Dynamics),
+        (scene, mut dynamics): (Scene, Dynamics),
         state: State,
         pending: PendingFaces,
     ) -> Self {
+        dynamics.share_threads(scene.threads());
         let initial = Snapshot { model: Arc::clone(&model), state, pending: pending.clone() };
         Self {
             model,
@@ -469,7 +475,8 @@ impl Simulation {
     /// If they could not be started.
     pub fn restart_threads(&mut self) -> Result<(), SimulationError> {
         self.scene.restart_threads()?;
-        Ok(self.dynamics.restart_threads()?)
+        self.dynamics.share_threads(self.scene.threads());
+        Ok(())
     }
 
     /// The mechanics, for momenta and factors.

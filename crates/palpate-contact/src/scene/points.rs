@@ -24,7 +24,7 @@ impl Scene {
         let among = self.among(body)?;
         found.clear();
         found.resize(points.len(), None);
-        for_each_point(self.pool.as_ref(), &mut found, 1, |index, found| {
+        for_each_point(self.threads.pool(), &mut found, 1, |index, found| {
             found[0] = among.closest(points[index], max_distance);
         });
         self.surface_points = found;
@@ -50,7 +50,7 @@ impl Scene {
         let width = if body.is_some() { 1 } else { self.bodies.len() };
         inside.clear();
         inside.resize(points.len() * width, false);
-        for_each_point(self.pool.as_ref(), &mut inside, width, |index, inside| {
+        for_each_point(self.threads.pool(), &mut inside, width, |index, inside| {
             among.contains(points[index], inside);
         });
         self.inside = inside;
@@ -89,7 +89,7 @@ impl Scene {
         let among = self.among(body)?;
         found.clear();
         found.resize(origins.len(), None);
-        for_each_point(self.pool.as_ref(), &mut found, 1, |index, found| {
+        for_each_point(self.threads.pool(), &mut found, 1, |index, found| {
             let ray = Ray::new(origins[index], directions[index]);
             found[0] = ray.and_then(|ray| among.cast(ray, max_distance));
         });

@@ -6,6 +6,7 @@
 use glam::DVec3;
 use palpate_contact::{PairKind, PenetratingNode, ProximityPair};
 use palpate_geometry::Point;
+use rayon::prelude::*;
 
 use super::{ContactParameters, Surface, side};
 
@@ -45,6 +46,9 @@ const LARGEST_FORCE: f64 = 20.0;
 const TWIN_COSINE: f64 = 0.9999;
 const TWIN_GAP: f64 = 0.01;
 
+/// Pairs that a thread tests at a time.
+const PAIRS_TOGETHER: usize = 256;
+
 /// A possible contact of this step.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Candidate {
@@ -80,6 +84,13 @@ struct Meeting {
     offset: f64,
 }
 
+/// What detection has found for a step.
+#[derive(Clone, Copy)]
+pub(crate) struct Detected<'a> {
+    pub(crate) proximity: &'a [ProximityPair],
+    pub(crate) penetration: &'a [PenetratingNode],
+}
+
 /// What the filter sees of one body.
 #[derive(Clone, Copy)]
 pub(crate) struct BodyView<'a> {
@@ -109,6 +120,8 @@ pub(crate) struct Filter {
     attached: Vec<(u32, u32, u32)>,
     /// (body, node, other body, candidate) of the nodes against triangles, sorted.
     by_node: Vec<(u32, u32, u32, u32)>,
+    /// Candidates of pairs that were tested together.
+    found: Vec<Vec<Candidate>>,
 }
 
 impl Filter {
@@ -120,40 +133,35 @@ impl Filter {
     /// `is_loaded` tells which pairs carried a force in the last step.
     pub(crate) fn run<'a>(
         &mut self,
-        proximity: &[ProximityPair],
-        penetration: &[PenetratingNode],
-        view: impl Fn(u32) -> BodyView<'a>,
-        is_loaded: impl Fn(&ProximityPair) -> bool,
+        Detected { proximity, penetration }: Detected<'_>,
+        view: impl Fn(u32) -> BodyView<'a> + Sync,
+        is_loaded: impl Fn(&ProximityPair) -> bool + Sync,
         time_step: f64,
+        pool: Option<&rayon::ThreadPool>,
         candidates: &mut Vec<Candidate>,
     ) {
         self.inside.clear();
         self.inside.extend(penetration.iter().map(|p| (p.body, p.node, p.into_body)));
         self.inside.sort_unstable();
-        for pair in proximity {
-            let bodies = pair.bodies.map(&view);
-            if bodies[0].parameters.rigid && bodies[1].parameters.rigid {
-                continue;
-            }
-            if self.is_attached(pair) {
-                continue;
-            }
-            let gap = match pair.kind {
-                PairKind::VertexTriangle => self.vertex_triangle(pair, bodies),
-                PairKind::EdgeEdge => edge_edge(pair, bodies, is_loaded(pair)),
-            };
-            if let Some(Meeting { gap, normal, offset }) = gap {
-                let area = match pair.kind {
-                    PairKind::VertexTriangle => bodies[0].surface.node_area(pair.nodes[0]),
-                    PairKind::EdgeEdge => {
-                        0.5 * (bodies[0].surface.edge_area(pair.elements[0])
-                            + bodies[1].surface.edge_area(pair.elements[1]))
-                    }
-                };
-                let candidate = candidate(pair, gap + offset, normal, area, bodies, time_step);
-                candidates.push(Candidate { offset, ..candidate });
-            }
+        let mut found = std::mem::take(&mut self.found);
+        let count = proximity.len().div_ceil(PAIRS_TOGETHER);
+        found.resize_with(count.max(found.len()), Vec::new);
+        let test = |(pairs, found): (&[ProximityPair], &mut Vec<Candidate>)| {
+            found.clear();
+            let candidate = |pair| self.test(pair, &view, &is_loaded, time_step);
+            found.extend(pairs.iter().filter_map(candidate));
+        };
+        let found_by = &mut found[..count];
+        match pool {
+            Some(pool) => pool.install(|| {
+                proximity.par_chunks(PAIRS_TOGETHER).zip(found_by).for_each(test);
+            }),
+            None => proximity.chunks(PAIRS_TOGETHER).zip(found_by).for_each(test),
         }
+        for found in &found[..count] {
+            candidates.extend_from_slice(found);
+        }
+        self.found = found;
         self.drop_twins(candidates);
         for node in penetration {
             let bodies = [view(node.body), view(node.into_body)];
@@ -178,6 +186,33 @@ impl Filter {
             let normal = DVec3::from_array(node.direction);
             candidates.push(candidate(&pair, -node.depth, normal, area, bodies, time_step));
         }
+    }
+
+    /// The contact of a pair, if it is one.
+    fn test<'a>(
+        &self,
+        pair: &ProximityPair,
+        view: impl Fn(u32) -> BodyView<'a>,
+        is_loaded: impl Fn(&ProximityPair) -> bool,
+        time_step: f64,
+    ) -> Option<Candidate> {
+        let bodies = pair.bodies.map(view);
+        if (bodies[0].parameters.rigid && bodies[1].parameters.rigid) || self.is_attached(pair) {
+            return None;
+        }
+        let Meeting { gap, normal, offset } = match pair.kind {
+            PairKind::VertexTriangle => self.vertex_triangle(pair, bodies),
+            PairKind::EdgeEdge => edge_edge(pair, bodies, is_loaded(pair)),
+        }?;
+        let area = match pair.kind {
+            PairKind::VertexTriangle => bodies[0].surface.node_area(pair.nodes[0]),
+            PairKind::EdgeEdge => {
+                0.5 * (bodies[0].surface.edge_area(pair.elements[0])
+                    + bodies[1].surface.edge_area(pair.elements[1]))
+            }
+        };
+        let candidate = candidate(pair, gap + offset, normal, area, bodies, time_step);
+        Some(Candidate { offset, ..candidate })
     }
 
     /// Whether all nodes of one side of a pair are attached to the body of the other.
@@ -458,7 +493,14 @@ mod tests {
             positions: bodies[body as usize].mesh.nodes(),
         };
         let mut candidates = Vec::new();
-        Filter::default().run(&[pair], &[], view, |_| is_loaded, 0.01, &mut candidates);
+        Filter::default().run(
+            Detected { proximity: &[pair], penetration: &[] },
+            view,
+            |_| is_loaded,
+            0.01,
+            None,
+            &mut candidates,
+        );
         !candidates.is_empty()
     }
 

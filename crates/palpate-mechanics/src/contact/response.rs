@@ -1,10 +1,10 @@
 //! The contact stage of a step: candidates, forces, and the contacts that are reported.
 
 use glam::DVec3;
-use palpate_contact::{PairKind, PenetratingNode, ProximityPair};
+use palpate_contact::{PairKind, ProximityPair};
 
 use super::Contact;
-use super::filter::{BodyView, Candidate, Filter};
+use super::filter::{BodyView, Candidate, Detected, Filter};
 use super::gauss_seidel::{Effort, GaussSeidel, SolveCost};
 use super::last_forces::LastForces;
 use super::problem::{Problem, expected_displacement, step_displacement};
@@ -57,17 +57,17 @@ impl Response {
     /// Finds the contact candidates of the step that has begun, and the nodes that it moves.
     pub(crate) fn find<'a>(
         &mut self,
-        proximity: &[ProximityPair],
-        penetration: &[PenetratingNode],
+        detected: Detected<'_>,
         body_count: usize,
         time_step: f64,
+        pool: Option<&rayon::ThreadPool>,
         body: impl Fn(usize) -> &'a MovingBody,
-        view: impl Fn(usize) -> BodyView<'a>,
+        view: impl Fn(usize) -> BodyView<'a> + Sync,
     ) {
         let view = |body: u32| view(body as usize);
         let (last, candidates) = (&self.last, &mut self.candidates);
         let is_loaded = |pair: &ProximityPair| last.holds(pair);
-        self.filter.run(proximity, penetration, view, is_loaded, time_step, candidates);
+        self.filter.run(detected, view, is_loaded, time_step, pool, candidates);
         self.spare.clear();
         let spare = &mut self.spare;
         self.candidates.retain(|candidate| {

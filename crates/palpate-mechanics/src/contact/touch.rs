@@ -10,7 +10,7 @@ use palpate_contact::{PairKind, PenetratingNode, ProximityPair};
 use palpate_geometry::Point;
 use palpate_model::Model;
 
-use super::filter::{BodyView, Candidate, Filter};
+use super::filter::{BodyView, Candidate, Detected, Filter};
 use super::law::Law;
 use super::problem::{Block, principal_axes};
 use super::{Contact, ContactParameters, Patch, Surface, side};
@@ -196,7 +196,14 @@ impl Touch {
             last.binary_search_by_key(&key, |contact| contact.key).is_ok()
         };
         candidates.clear();
-        filter.run(proximity, penetration, view, is_loaded, self.time_step, candidates);
+        filter.run(
+            Detected { proximity, penetration },
+            view,
+            is_loaded,
+            self.time_step,
+            None,
+            candidates,
+        );
         let reach = self.search_distance();
         self.candidates.retain(|candidate| candidate.gap < reach);
     }

@@ -76,14 +76,13 @@ impl Dynamics {
         let kept: Vec<bool> = made.iter().map(Option::is_none).collect();
         let mut before: Vec<Option<MovingBody>> =
             self.take_bodies().into_iter().map(Some).collect();
-        let pool = self.pool.take();
-        let mut next = Self::with_bodies(model, self.options, pool, |index| {
+        let threads = self.threads.clone();
+        let mut next = Self::with_bodies(model, self.options, threads, |index| {
             let body = made[index].take().or_else(|| before[index].take());
             Ok(body.expect("made, or there before"))
         })
         .expect("every body has been checked");
         if let Err(error) = next.set_state(state) {
-            self.pool = next.pool.take();
             for (index, body) in next.take_bodies().into_iter().enumerate() {
                 if kept[index] {
                     before[index] = Some(body);
