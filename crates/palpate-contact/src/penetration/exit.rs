@@ -144,10 +144,10 @@ impl Node<'_> {
         self.closest(within, |triangle, _, _| self.is_elsewhere(triangle))
     }
 
-    /// The record of an exit; `None` when the exit is where the node is.
+    /// The record of an exit; `None` when the exit is where the node is, or its distance overflows.
     fn record(&self, exit: &Closest) -> Option<PenetratingNode> {
         let depth = exit.distance_squared.sqrt();
-        if depth == 0.0 {
+        if depth == 0.0 || !depth.is_finite() {
             return None;
         }
         let Closest { triangle, weights, .. } = *exit;

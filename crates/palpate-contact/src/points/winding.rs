@@ -90,7 +90,8 @@ impl Surfaces<'_> {
 }
 
 /// Crossing of the ray from `point` along +x with a triangle that does not hold the point: +1 where the
-/// ray leaves through its front, -1 where it enters, 0 where it misses.
+/// ray leaves through its front, -1 where it enters, 0 where it misses. Where the box of the triangle tells
+/// that, coordinates are only compared: so the answer is that of a search by boxes, whatever overflows.
 fn crossing(triangle: &[Point; 3], point: &Point) -> i32 {
     let above = triangle.map(|corner| corner[2] > point[2]);
     // Turning number of the projected triangle around the point: each edge that passes the line
@@ -110,6 +111,12 @@ fn crossing(triangle: &[Point; 3], point: &Point) -> i32 {
     if turns == 0 {
         return 0;
     }
+    if triangle.iter().all(|corner| corner[0] < point[0]) {
+        return 0;
+    }
+    if triangle.iter().all(|corner| corner[0] > point[0]) {
+        return turns;
+    }
     let [a, b, c] = *triangle;
     // Seen along +x the triangle comes after the point when the point is behind a front that faces +x,
     // or before a front that faces -x.
@@ -119,6 +126,12 @@ fn crossing(triangle: &[Point; 3], point: &Point) -> i32 {
 
 /// Whether the edge from `lower` to `upper` (by z) passes the point's height at a larger y.
 fn passes_at_larger_y(lower: &Point, upper: &Point, point: &Point) -> bool {
+    if lower[1] > point[1] && upper[1] > point[1] {
+        return true;
+    }
+    if lower[1] < point[1] && upper[1] < point[1] {
+        return false;
+    }
     let [lower, upper, point] = [lower, upper, point].map(|corner| [corner[1], corner[2]]);
     predicates::orient2d(lower, upper, point) > 0
 }

@@ -498,6 +498,17 @@ fn ignored_pairs_are_left_out_and_groups_are_not() {
 }
 
 #[test]
+fn a_way_out_whose_length_overflows_is_none() {
+    // Found by fuzzing: such a distance was infinite, and which triangle had it depended on the method.
+    let far = block([1, 1, 1], |p| p.map(|value| 2e307 * (value - 0.4)));
+    for options in every_way() {
+        let mut scene = scene(&[far.clone(), block([1, 1, 1], |p| p)], options);
+        assert_eq!(scene.penetration(&|_, _| true).nodes, [], "{options:?}");
+        assert_eq!(scene.contains(&[[0.5; 3]], Some(0)).expect("finite"), [true]);
+    }
+}
+
+#[test]
 fn a_box_leaves_the_way_it_came() {
     // Into the top of a box, 0.3 m and 3.7 m deep of 4 m, near its side: only the top is crossed.
     for depth in [0.3, 1.2, 3.7] {

@@ -7,9 +7,9 @@ use std::sync::Arc;
 use palpate::contact::{
     IntersectionOptions, Intersections, Method, ProximityOptions, Scene, SceneOptions,
 };
-use palpate::cutting::{Blade, CutOptions, cut};
-use palpate::geometry::Point;
-use palpate::{Mesh, MeshData};
+use palpate::cutting::{Blade, BladeError, CutOptions};
+use palpate::geometry::{Point, vec3};
+use palpate::{Mesh, MeshData, SceneCuts};
 
 use super::shapes::{box_of, plate};
 use super::{Target, ensure};
@@ -19,7 +19,7 @@ use crate::choices::Choices;
 pub(crate) struct SceneCalls;
 
 /// More tetrahedra than this in a body are not cut again.
-const LARGE: usize = 300;
+const LARGE: usize = 120;
 
 impl Target for SceneCalls {
     fn name(&self) -> &'static str {
@@ -127,7 +127,10 @@ pub(crate) fn moved(nodes: &[Point], choices: &mut Choices) -> Vec<Point> {
 
 /// The same scene by every method; the double loop first.
 struct Scenes {
-    scenes: Vec<Scene>,
+    by_method: Vec<Scene>,
+    cuts: SceneCuts,
+    /// The last blade.
+    last: Option<Blade>,
 }
 
 impl Scenes {
@@ -144,7 +147,8 @@ impl Scenes {
             let options = SceneOptions { leaf_size, split, method, threads };
             Scene::new(meshes.to_vec(), None, options).map_err(|error| error.to_string())
         };
-        Ok(Self { scenes: methods.into_iter().map(make).collect::<Result<_, _>>()? })
+        let by_method = methods.into_iter().map(make).collect::<Result<_, _>>()?;
+        Ok(Self { by_method, cuts: SceneCuts::default(), last: None })
     }
 
     /// The same call of each; its answers must be the same.
@@ -153,7 +157,8 @@ impl Scenes {
         what: &str,
         mut call: impl FnMut(&mut Scene) -> T,
     ) -> Result<T, String> {
-        let mut answers = self.scenes.iter_mut().map(|scene| (scene.options().method, call(scene)));
+        let mut answers =
+            self.by_method.iter_mut().map(|scene| (scene.options().method, call(scene)));
         let (_, expected) = answers.next().ok_or("no scene")?;
         for (method, answer) in answers {
             ensure(answer == expected, || {
@@ -164,11 +169,11 @@ impl Scenes {
     }
 
     fn call(&mut self, choices: &mut Choices) -> Result<String, String> {
-        let count = self.scenes[0].body_count();
+        let count = self.by_method[0].body_count();
         let body = choices.below(count + 1);
-        match choices.below(10) {
+        match choices.below(14) {
             0..=3 => {
-                let scene = &self.scenes[0];
+                let scene = &self.by_method[0];
                 let mut positions: Vec<Vec<Point>> =
                     (0..count).map(|body| scene.mesh(body).nodes().to_vec()).collect();
                 for of_body in &mut positions {
@@ -185,7 +190,7 @@ impl Scenes {
                 });
                 // Errors with NaN are compared as text, as NaN is not equal to itself.
                 let done = done?;
-                for scene in &self.scenes {
+                for scene in &self.by_method {
                     let expected = if done.is_ok() { &positions } else { &before };
                     for (body, expected) in expected.iter().enumerate() {
                         ensure(scene.positions(body) == expected.as_slice(), || {
@@ -228,7 +233,7 @@ impl Scenes {
             }
             8 => {
                 let triangles =
-                    if body < count { self.scenes[0].mesh(body).triangles().len() } else { 2 };
+                    if body < count { self.by_method[0].mesh(body).triangles().len() } else { 2 };
                 let groups: Vec<u32> = (0..triangles).map(|_| choices.below(4) as u32).collect();
                 let done = self.all("set_groups", |scene| {
                     scene.set_groups(body, &groups).map_err(|error| error.to_string())
@@ -240,29 +245,65 @@ impl Scenes {
     }
 
     fn cut(&mut self, body: usize, choices: &mut Choices) -> Result<String, String> {
-        let (point, normal) = (choices.point(), choices.point());
-        let size = choices.flag().then(|| choices.number());
-        let blade = match Blade::plane(point, normal, size) {
+        if self.by_method[0].mesh(body).tetrahedra().len() > LARGE {
+            return Ok(String::new());
+        }
+        let blade = match self.blade(body, choices) {
             Ok(blade) => blade,
             Err(error) => return Ok(error.to_string()),
         };
-        let mesh = Arc::clone(self.scenes[0].mesh(body));
-        if mesh.tetrahedra().len() > LARGE {
-            return Ok(String::new());
+        self.last = Some(blade.clone());
+        let [first, others @ ..] = &mut self.by_method[..] else {
+            return Err("no scene".into());
+        };
+        let done = match self.cuts.cut(first, &[body], &blade, &CutOptions::default()) {
+            Ok(done) => done,
+            Err(error) => return Ok(error.to_string()),
+        };
+        let Some((_, done)) = done.first() else {
+            return Ok(" missed".into());
+        };
+        Mesh::new(done.change.mesh.as_ref().clone().into_data())
+            .map_err(|error| format!("a cut mesh is none: {error}"))?;
+        for scene in others {
+            scene.change_body(body, &done.change).map_err(|error| error.to_string())?;
         }
-        let positions = self.scenes[0].positions(body).to_vec();
-        match cut(&mesh, &positions, &blade, &CutOptions::default()) {
-            Ok(None) => Ok(" missed".into()),
-            Ok(Some(done)) => {
-                Mesh::new(done.change.mesh.as_ref().clone().into_data())
-                    .map_err(|error| format!("a cut mesh is none: {error}"))?;
-                self.all("change_body", |scene| {
-                    scene.change_body(body, &done.change).map_err(|error| error.to_string())
-                })??;
-                self.compare(choices)?;
-                Ok(" cut".into())
+        for scene in &self.by_method {
+            let valid = scene.tree(body).validate(scene.mesh(body), scene.positions(body));
+            valid.map_err(|error| format!("the tree after a cut: {error:?}"))?;
+        }
+        self.compare(choices)?;
+        Ok(" cut".into())
+    }
+
+    /// A blade: anywhere, exactly through nodes, along a triangle of the surface, from edge to edge, or
+    /// where the last one was.
+    fn blade(&self, body: usize, choices: &mut Choices) -> Result<Blade, BladeError> {
+        let scene = &self.by_method[0];
+        let positions = scene.positions(body);
+        let mut node = || positions[choices.below(positions.len())];
+        let [a, b, c] = [node(), node(), node()];
+        match (choices.below(6), &self.last) {
+            (0, Some(last)) => Ok(last.clone()),
+            (1 | 2, _) => {
+                let normal = vec3::cross(vec3::sub(b, a), vec3::sub(c, a));
+                Blade::plane(a, normal, choices.flag().then(|| choices.number()))
             }
-            Err(error) => Ok(error.to_string()),
+            (3, _) => {
+                let triangles = scene.mesh(body).triangles();
+                let triangle = triangles[choices.below(triangles.len())];
+                let points = triangle.map(|node| positions[node as usize]);
+                Blade::new(&points, &[[0, 1, 2]])
+            }
+            (4, _) => {
+                let shift = choices.small_point();
+                let moved = |p: Point| vec3::add(p, shift);
+                Blade::stroke(&[[a, b], [moved(a), moved(b)], [moved(moved(a)), c]])
+            }
+            _ => {
+                let (point, normal) = (choices.point(), choices.point());
+                Blade::plane(point, normal, choices.flag().then(|| choices.number()))
+            }
         }
     }
 
