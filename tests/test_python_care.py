@@ -8,6 +8,7 @@ import threading
 import time
 import tracemalloc
 import weakref
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -159,29 +160,39 @@ def test_other_threads_run_on_while_the_core_works(name: str) -> None:
     points = np.random.default_rng(0).random((80_000, 3))
     scene = palpate.Scene([box(cells), box(cells, origin=(0.31, 0.27, 0.23))], method="all-pairs")
     simulation = palpate.Simulation([box((12, 12, 12), size=0.1)])
+    # On a loaded machine a thread may wait for other reasons; kept for the whole call, it waits every time.
+    for _ in range(5):
+        longest, spent, ticks = waits(lambda: LONG_CALLS[name](scene, simulation, points))
+        if ticks >= 5 and longest < 0.6 * spent:
+            return
+    pytest.fail(f"{name}: of {spent:.3f} s another thread waited {longest:.3f} s, {ticks} ticks")
+
+
+def waits(call: Callable[[], object]) -> tuple[float, float, int]:
+    """The longest time between two ticks of this thread while another one calls, the time that the call
+    takes, and the ticks in it.
+    """
     done = threading.Event()
     spent: list[float] = []
     ticks = 0
 
     def work() -> None:
         start = time.perf_counter()
-        LONG_CALLS[name](scene, simulation, points)
+        call()
         spent.append(time.perf_counter() - start)
         done.set()
 
     worker = threading.Thread(target=work)
-    start = time.perf_counter()
+    last = time.perf_counter()
     worker.start()
-    longest, last = 0.0, start
+    longest = 0.0
     while not done.is_set():
         time.sleep(0.0005)
         now = time.perf_counter()
         longest, last = max(longest, now - last), now
         ticks += 1
     worker.join()
-    assert spent[0] > 0.02, "too short to tell"
-    assert ticks >= 5
-    assert longest < 0.6 * spent[0]
+    return longest, spent[0], ticks
 
 
 def test_two_scenes_in_two_threads() -> None:
