@@ -160,7 +160,7 @@ def test_other_threads_run_on_while_the_core_works(name: str) -> None:
     points = np.random.default_rng(0).random((80_000, 3))
     scene = palpate.Scene([box(cells), box(cells, origin=(0.31, 0.27, 0.23))], method="all-pairs")
     simulation = palpate.Simulation([box((12, 12, 12), size=0.1)])
-    # On a loaded machine a thread may wait for other reasons; kept for the whole call, it waits every time.
+    # On a loaded machine a thread may wait for other reasons; kept out, it waits every time.
     for _ in range(5):
         longest, spent, ticks = waits(lambda: LONG_CALLS[name](scene, simulation, points))
         if ticks >= 5 and longest < 0.6 * spent:
@@ -169,8 +169,9 @@ def test_other_threads_run_on_while_the_core_works(name: str) -> None:
 
 
 def waits(call: Callable[[], object]) -> tuple[float, float, int]:
-    """The longest time between two ticks of this thread while another one calls, the time that the call
-    takes, and the ticks in it.
+    """The longest time between two ticks of this thread while another one calls.
+
+    Also the time that the call takes, and the ticks in it.
     """
     done = threading.Event()
     spent: list[float] = []
