@@ -289,7 +289,8 @@ class Scene:
         Known limits: direction and depth jump where a triangle begins or ends to cross, where two
         exits are equally near, and when a part goes under as a whole. A node that came out on the
         far side of a thin body is outside. In a body with tetrahedra turned over, nodes inside
-        itself may be missed.
+        itself may be missed; so are those of a body in one part whose only triangles that meet
+        share nodes.
 
         Parameters
         ----------
