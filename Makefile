@@ -22,6 +22,11 @@ $(BIN)/maturin:
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check "maturin>=1.16,<2"
 
 $(VENV)/.installed: $(BIN)/maturin $(SOURCES)
+	VIRTUAL_ENV=$(abspath $(VENV)) $(BIN)/maturin develop --release --locked --extras all
+	@touch $@
+
+# What only those who work on it need.
+$(VENV)/.tools: $(VENV)/.installed
 	VIRTUAL_ENV=$(abspath $(VENV)) $(BIN)/maturin develop --release --locked --extras all,test,lint
 	@touch $@
 
@@ -38,7 +43,7 @@ test: test-rust test-python ## Run every test: Rust, Python, documents, examples
 test-rust:
 	cargo test --release --locked --quiet $(CRATES)
 
-test-python: install
+test-python: $(VENV)/.tools
 	$(BIN)/python -m pytest
 
 bits: ## The same bits in a release and in a debug build
@@ -46,7 +51,7 @@ bits: ## The same bits in a release and in a debug build
 	PALPATE_BITS=$(abspath target)/bits cargo test --release --locked -p palpate --test bits
 	PALPATE_BITS=$(abspath target)/bits cargo test --locked -p palpate --test bits
 
-kills: install ## Kill every command a hundred times at random
+kills: $(VENV)/.tools ## Kill every command a hundred times at random
 	PALPATE_KILLS=100 $(BIN)/python -m pytest tests/test_interruption.py
 
 soak: ## Compare with the double loop on fresh random scenes for MINUTES (10)
@@ -69,7 +74,7 @@ bench: ## Time each stage of detection; count its instructions with valgrind
 	cargo build --release --locked -p palpate-contact --example stage_count
 	$(PYTHON) benchmarks/instructions.py $${CARGO_TARGET_DIR:-target}/release/examples/stage_count
 
-lint: install ## Check format, clippy, rustdoc, ruff and types
+lint: $(VENV)/.tools ## Check format, clippy, rustdoc, ruff and types
 	cargo fmt --all --check
 	cargo clippy --locked --workspace --all-targets --release -- -D warnings
 	RUSTDOCFLAGS="-D warnings" cargo doc --locked --release --no-deps --workspace --exclude palpate-python
@@ -81,7 +86,7 @@ lint: install ## Check format, clippy, rustdoc, ruff and types
 deny: ## Check licences and advisories of what is linked (needs cargo-deny and the network)
 	cargo deny --locked check
 
-format: install ## Format Rust and Python
+format: $(VENV)/.tools ## Format Rust and Python
 	cargo fmt --all
 	$(BIN)/ruff format python tests examples docs
 	$(BIN)/ruff check --fix python tests examples docs
@@ -90,7 +95,7 @@ docs: $(VENV)/.docs ## Build the manual: docs/_build/html/index.html
 	$(BIN)/sphinx-build -W --keep-going -q -b html docs docs/_build/html
 	@echo docs/_build/html/index.html
 
-$(VENV)/.docs: $(VENV)/.installed
+$(VENV)/.docs: $(VENV)/.tools
 	VIRTUAL_ENV=$(abspath $(VENV)) $(BIN)/maturin develop --release --locked --extras all,test,lint,docs
 	@touch $@
 
