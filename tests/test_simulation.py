@@ -326,10 +326,13 @@ def test_a_step_that_fails_names_where_and_why_and_changes_nothing(make_box):
         assert simulation.time == 1 / 60
 
 
-@pytest.mark.parametrize("friction", [0.1, 0.4])
-def test_organs_in_a_pile_come_to_rest(friction):
+@pytest.mark.parametrize(
+    ("name", "friction"),
+    [("case1", 0.1), ("case1", 0.3), ("case1", 0.4), ("case2", 0.3), ("case2", 0.5)],
+)
+def test_organs_in_a_pile_come_to_rest(name, friction):
     # Each setting ends in another pile, with other contacts on the verge of coming and going.
-    model = palpate.read_model("case1")
+    model = palpate.read_model(name)
     for body in model.bodies:
         assert body.rigid is not None or body.material.law == "neo-hookean"
     bodies = [
@@ -338,5 +341,7 @@ def test_organs_in_a_pile_come_to_rest(friction):
     simulation = palpate.Simulation(palpate.Model(bodies, gravity=model.gravity))
     report = simulation.step(200)
     assert report.contacts > 100
-    fastest = max(np.linalg.norm(velocities, axis=1).max() for velocities in simulation.velocities)
-    assert fastest < 1e-4
+    for _ in range(30):
+        simulation.step()
+        speeds = [np.linalg.norm(velocities, axis=1).max() for velocities in simulation.velocities]
+        assert max(speeds) < 1e-5

@@ -19,7 +19,7 @@ const FACING_LIMIT: f64 = 0.2;
 const SHARP_EDGE: f64 = 0.25;
 /// The same for a pair that carried a force in the last step: where pushing and letting go flatten and
 /// sharpen an edge across the limit, a pair would come and go for ever and the bodies never rest.
-const LOADED_SHARP_EDGE: f64 = 0.125;
+const LOADED_SHARP_EDGE: f64 = 0.05;
 /// Slack in the tests of direction of such a pair.
 const LOADED_SLACK: f64 = 0.05;
 /// Elements of one body closer than this at rest, in contact distances, do not push each other.
@@ -508,6 +508,6 @@ mod tests {
     fn a_pair_that_bears_a_force_is_not_dropped_at_the_limit_where_it_began() {
         assert!(edges_touch(0.2, false) && edges_touch(0.2, true));
         assert!(!edges_touch(0.1, false) && edges_touch(0.1, true));
-        assert!(!edges_touch(0.03, false) && !edges_touch(0.03, true));
+        assert!(!edges_touch(0.02, false) && !edges_touch(0.02, true));
     }
 }
