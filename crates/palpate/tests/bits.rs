@@ -175,15 +175,6 @@ fn simulation(law: Law, threads: usize) -> u64 {
     hash.0
 }
 
-const LAWS: [Law; 6] = [
-    Law::Linear,
-    Law::Corotated,
-    Law::SaintVenantKirchhoff,
-    Law::NeoHookean,
-    Law::MooneyRivlin,
-    Law::HolzapfelGasserOgden,
-];
-
 const DETECTION: u64 = 0x4b71_fb88_6a72_ebea;
 const CUTS: u64 = 0x8d83_c722_5f31_509a;
 
@@ -204,7 +195,7 @@ fn cuts_have_the_committed_bits() {
 
 #[test]
 fn simulations_have_the_same_bits_at_any_number_of_threads() {
-    for law in LAWS {
+    for law in Law::ALL {
         let expected = simulation(law, 1);
         for threads in [2, 3, 8, 16] {
             assert_eq!(simulation(law, threads), expected, "{law:?}, {threads} threads");
@@ -214,7 +205,7 @@ fn simulations_have_the_same_bits_at_any_number_of_threads() {
 
 /// All hashes, in a text.
 fn told() -> String {
-    let laws = LAWS.iter().map(|&law| format!("{law:?} {:#018x}\n", simulation(law, 1)));
+    let laws = Law::ALL.iter().map(|&law| format!("{law:?} {:#018x}\n", simulation(law, 1)));
     laws.chain([format!("detection {:#018x}\n", detection(Method::Wide, 1))]).collect()
 }
 

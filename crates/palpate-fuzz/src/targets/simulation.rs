@@ -62,14 +62,6 @@ impl Target for SimulationCalls {
 
 /// One to three soft bodies above a plate, with all sorts of settings.
 pub(crate) fn model(choices: &mut Choices) -> Model {
-    let laws = [
-        Law::Linear,
-        Law::Corotated,
-        Law::SaintVenantKirchhoff,
-        Law::NeoHookean,
-        Law::MooneyRivlin,
-        Law::HolzapfelGasserOgden,
-    ];
     let mut bodies: Vec<Body> = (0..=choices.below(3))
         .map(|index| {
             let cells = [[1, 1, 1], [2, 1, 1], [2, 2, 1], [1, 2, 2]][choices.below(4)];
@@ -77,7 +69,7 @@ pub(crate) fn model(choices: &mut Choices) -> Model {
             origin[2] += 0.05 * index as f64 + 0.02;
             let mesh = Arc::new(box_of(cells, 0.04, origin));
             let mut body = Body::new(format!("soft {index}"), mesh);
-            body.material.law = laws[choices.below(laws.len())];
+            body.material.law = Law::ALL[choices.below(Law::ALL.len())];
             if choices.below(8) == 0 {
                 body.material.young = choices.number() * 1e4;
             }
