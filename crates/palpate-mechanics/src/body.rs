@@ -270,7 +270,7 @@ impl MovingBody {
         self.elastic().map_or(0, ElasticBody::newton_iterations)
     }
 
-    /// The positions whose stiffness is in use; empty for those of the rest shape.
+    /// The shape whose stiffness is in use, in its frame; empty for the rest shape.
     pub(crate) fn stiff_shape(&self) -> &[Point] {
         self.elastic().map_or(&[], ElasticBody::stiff_shape)
     }

@@ -62,8 +62,8 @@ pub struct BodyState {
     /// Shape in the body's frame for which its response to contact was computed last [m]; empty if
     /// it was not.
     pub shape: Vec<Point>,
-    /// Positions [m] whose stiffness a body with a nonlinear law is solved with; empty: the rest
-    /// shape's.
+    /// Shape in the body's frame whose stiffness a body with a nonlinear law is solved with [m]; empty:
+    /// the rest shape.
     pub stiff_shape: Vec<Point>,
     /// Order in which the free nodes of a body that was cut are eliminated; empty: what the body finds
     /// itself.

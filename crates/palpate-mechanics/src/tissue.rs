@@ -408,23 +408,29 @@ fn places(pattern: &BlockPattern, group: &Group) -> Places {
 
 /// For every node where its corners stand among the corner forces, in the order of the groups.
 fn corners_of_nodes(layout: &Layout, node_count: usize) -> (Vec<u32>, Vec<u32>) {
-    let mut entries = Vec::new();
-    for (index, (group, members)) in layout.groups.iter().zip(&layout.members).enumerate() {
-        for (corner, nodes) in group.corners.iter().enumerate() {
-            for (lane, &node) in nodes.iter().enumerate() {
-                if members[lane] != PADDING {
-                    entries.push((node, (((4 * index + corner) * 3) * LANES + lane) as u32));
-                }
-            }
-        }
-    }
-    entries.sort_unstable();
+    let corners = || {
+        layout.groups.iter().zip(&layout.members).enumerate().flat_map(|(index, (group, members))| {
+            group.corners.iter().enumerate().flat_map(move |(corner, nodes)| {
+                let lanes = nodes.iter().zip(members).enumerate();
+                let filled = lanes.filter(|(_, (_, member))| **member != PADDING);
+                filled.map(move |(lane, (&node, _))| {
+                    (node as usize, (((4 * index + corner) * 3) * LANES + lane) as u32)
+                })
+            })
+        })
+    };
     let mut starts = vec![0; node_count + 1];
-    for &(node, _) in &entries {
-        starts[node as usize + 1] += 1;
+    for (node, _) in corners() {
+        starts[node + 1] += 1;
     }
     for node in 0..node_count {
         starts[node + 1] += starts[node];
     }
-    (starts, entries.into_iter().map(|(_, place)| place).collect())
+    let mut places = vec![0; starts[node_count] as usize];
+    let mut next = starts.clone();
+    for (node, place) in corners() {
+        places[next[node] as usize] = place;
+        next[node] += 1;
+    }
+    (starts, places)
 }

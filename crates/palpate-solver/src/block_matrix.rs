@@ -21,51 +21,42 @@ impl BlockPattern {
     /// # Panics
     /// If a clique names a node that is not below `node_count`.
     pub fn from_cliques<const N: usize>(node_count: usize, cliques: &[[u32; N]]) -> Self {
-        // Room for all entries of each column, some of them more than once.
         let mut starts = vec![0_u32; node_count + 1];
-        for col in 0..node_count {
-            starts[col + 1] = 1;
+        for &node in cliques.as_flattened() {
+            assert!((node as usize) < node_count, "node {node} of {node_count}");
+            starts[node as usize + 1] += 1;
         }
-        for clique in cliques {
-            for &row in clique {
-                assert!((row as usize) < node_count, "node {row} of {node_count}");
-                for &col in clique.iter().filter(|&&col| col < row) {
-                    starts[col as usize + 1] += 1;
-                }
-            }
+        for node in 0..node_count {
+            starts[node + 1] += starts[node];
         }
-        for col in 0..node_count {
-            starts[col + 1] += starts[col];
-        }
-        let mut rows = vec![0; starts[node_count] as usize];
+        let mut cliques_of = vec![0; N * cliques.len()];
         let mut next = starts.clone();
-        let mut push = |col: u32, row: u32| {
-            rows[next[col as usize] as usize] = row;
-            next[col as usize] += 1;
-        };
-        for node in 0..node_count as u32 {
-            push(node, node);
-        }
-        for clique in cliques {
-            for &row in clique {
-                clique.iter().filter(|&&col| col < row).for_each(|&col| push(col, row));
+        for (index, clique) in cliques.iter().enumerate() {
+            for &node in clique {
+                cliques_of[next[node as usize] as usize] = index as u32;
+                next[node as usize] += 1;
             }
         }
         let mut column_starts = Vec::with_capacity(node_count + 1);
         column_starts.push(0);
-        let mut kept = 0;
-        for col in 0..node_count {
-            let range = starts[col] as usize..starts[col + 1] as usize;
-            rows[range.clone()].sort_unstable();
-            for place in range.clone() {
-                if place == range.start || rows[place] != rows[kept - 1] {
-                    rows[kept] = rows[place];
-                    kept += 1;
+        let mut rows = Vec::new();
+        // The column that each node was found in last.
+        let mut found_in: Vec<u32> = (0..node_count as u32).collect();
+        for col in 0..node_count as u32 {
+            let first = rows.len();
+            rows.push(col);
+            let range = starts[col as usize] as usize..starts[col as usize + 1] as usize;
+            for &clique in &cliques_of[range] {
+                for &row in &cliques[clique as usize] {
+                    if row > col && found_in[row as usize] != col {
+                        found_in[row as usize] = col;
+                        rows.push(row);
+                    }
                 }
             }
-            column_starts.push(kept as u32);
+            rows[first..].sort_unstable();
+            column_starts.push(rows.len() as u32);
         }
-        rows.truncate(kept);
         rows.shrink_to_fit();
         Self { column_starts, rows }
     }
@@ -107,8 +98,9 @@ impl BlockPattern {
 
     /// Storage index of block (`row`, `col`) with `row >= col`, `None` outside the pattern.
     pub fn find(&self, row: u32, col: u32) -> Option<usize> {
+        // Columns are short.
         let range = self.range(col as usize);
-        self.rows[range.clone()].binary_search(&row).ok().map(|i| range.start + i)
+        self.rows[range.clone()].iter().position(|&other| other == row).map(|i| range.start + i)
     }
 
     pub(crate) fn range(&self, col: usize) -> std::ops::Range<usize> {

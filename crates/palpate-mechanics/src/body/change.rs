@@ -12,8 +12,9 @@ impl MovingBody {
     /// Positions and velocities are those of the material points, so that linear momentum is kept: a
     /// tetrahedron's parts have the momentum of the whole. (Spin changes by what the lumped masses move, of
     /// second order in the size of the tetrahedra that are split.) Copies of a node share its external
-    /// force by their masses. A is made of the stiffness where the body is now, in the order of elimination
-    /// that it had, new nodes next to those that they come from.
+    /// force by their masses. A is made of the stiffness in the shape that it was made of, in the order of
+    /// elimination that it had, new nodes next to those that they come from, so that it stays as it was
+    /// where the mesh has not changed.
     pub(crate) fn changed(
         &self,
         body: &Body,
@@ -23,7 +24,11 @@ impl MovingBody {
     ) -> Result<Self, MechanicsError> {
         let positions = change.positions(&self.positions);
         let order = self.elastic().map_or_else(Vec::new, |old| order_after(old, body, change));
-        let known = Known { order: &order, shape: &positions };
+        let shape = match self.stiff_shape() {
+            [] => Vec::new(),
+            shape => change.positions(shape),
+        };
+        let known = Known { order: &order, shape: &shape };
         let mut result = Self::new(self.index, body, gravity, time_step, known)?;
         result.positions = positions;
         result.velocities = change.positions(&self.velocities);

@@ -70,7 +70,7 @@ enum Elasticity {
 pub(crate) struct Known<'a> {
     /// Order of elimination of the free nodes.
     pub(crate) order: &'a [u32],
-    /// Positions [m] whose stiffness A is to be made of; empty: those at rest.
+    /// Arms [m] of the shape whose stiffness A is to be made of, in its frame; empty: that at rest.
     pub(crate) shape: &'a [Point],
 }
 
@@ -125,20 +125,11 @@ impl ElasticBody {
             (Elasticity::Linear(stiffness), factored(&system.into_matrix())?)
         } else {
             let mut method = QuasiNewton::new(body, &free_index);
-            let mut at_shape = None;
-            if !known.shape.is_empty() {
-                let shape = known.shape.iter().map(|&x| DVec3::from_array(x));
-                let place = place_of(&masses, &rest, shape);
-                let system = method.system_at(known.shape, place, &masses, inertia, time_step);
-                at_shape = factored(system).ok();
-            }
-            let factor = match at_shape {
-                Some(factor) => {
-                    method.set_stiff_shape(known.shape);
-                    factor
-                }
-                None => factored(method.system_at_rest(&rest, &masses, inertia, time_step))?,
+            let mut at = |shape: &[Point]| {
+                factored(method.system_at(shape, &masses, inertia, time_step))
             };
+            // What fails in a shape does not at rest, but where the fault is not the shape's.
+            let factor = at(known.shape).or_else(|_| at(&[]))?;
             (Elasticity::Nonlinear(Box::new(method)), factor)
         };
         let workspace = factor.workspace();

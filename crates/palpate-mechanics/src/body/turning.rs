@@ -11,9 +11,12 @@
 use glam::{DMat3, DVec3};
 
 /// Largest change of an arm from another shape, relative to the longest arm.
-pub(super) fn largest_change(arms: impl Iterator<Item = DVec3>, others: &[DVec3]) -> f64 {
+pub(super) fn largest_change(
+    arms: impl Iterator<Item = DVec3>,
+    others: impl Iterator<Item = DVec3>,
+) -> f64 {
     let (mut change, mut radius) = (0.0_f64, 0.0_f64);
-    for (arm, &other) in arms.zip(others) {
+    for (arm, other) in arms.zip(others) {
         change = change.max((arm - other).length_squared());
         radius = radius.max(arm.length_squared());
     }

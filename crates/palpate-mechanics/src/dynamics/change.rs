@@ -135,7 +135,6 @@ impl State {
                 positions: change.positions(&saved.positions),
                 velocities: change.positions(&saved.velocities),
                 forces: change.positions(&saved.forces),
-                stiff_shape: change.positions(&saved.positions),
                 ..BodyState::default()
             }
         });

@@ -64,10 +64,12 @@ impl Task for Stiffness<'_> {
         self.group = elements.index;
     }
 
+    /// Adds the blocks tetrahedron by tetrahedron: the same sums to the last bit whatever else is in
+    /// the group.
     fn finish_group(&mut self, _: &Group) {
-        for (pair, [row, col]) in PAIRS.into_iter().enumerate() {
-            let values = &self.values[pair];
-            for (lane, place) in self.places[self.group][pair].iter().enumerate() {
+        for lane in 0..LANES {
+            for (pair, [row, col]) in PAIRS.into_iter().enumerate() {
+                let (values, place) = (&self.values[pair], &self.places[self.group][pair][lane]);
                 let block = &mut self.blocks[place.index as usize];
                 for a in 0..3 {
                     for b in 0..3 {

@@ -6,9 +6,9 @@
 
 use std::sync::Arc;
 
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 use palpate_geometry::Point;
-use palpate_model::Body;
+use palpate_model::{Body, Mesh};
 use palpate_solver::BlockMatrix;
 
 use super::system::SystemMatrix;
@@ -62,10 +62,9 @@ pub(super) struct QuasiNewton {
     /// Stiffness, and A made of it, when the shape has changed.
     stiffness: BlockMatrix,
     system: SystemMatrix,
-    /// Where the stiffness was taken [m]; empty: at rest.
+    /// Arms of the shape whose stiffness was taken, in its frame [m]; empty: at rest.
     stiff_shape: Vec<Point>,
-    /// Arms of that shape about its centre, in its frame [m].
-    stiff_arms: Vec<DVec3>,
+    mesh: Arc<Mesh>,
     /// Iterations of the last step.
     iterations: u32,
     /// Solves for the contact forces in the last step, and the larger of that and the iterations of
@@ -106,7 +105,7 @@ impl QuasiNewton {
             stiffness,
             system,
             stiff_shape: Vec::with_capacity(node_count),
-            stiff_arms: Vec::with_capacity(node_count),
+            mesh: Arc::clone(&body.mesh),
             iterations: 0,
             passes: 0,
             effort: 0,
@@ -114,32 +113,24 @@ impl QuasiNewton {
         }
     }
 
-    /// A of the rest shape.
-    pub(super) fn system_at_rest(
-        &mut self,
-        rest: &[DVec3],
-        masses: &[f64],
-        inertia: f64,
-        time_step: f64,
-    ) -> &BlockMatrix {
-        self.stiff_arms.clear();
-        self.stiff_arms.extend_from_slice(rest);
-        self.system_of_arms(masses, inertia, time_step)
-    }
-
-    /// A at `shape` [m], whose centre and frame are `place`.
+    /// A of a shape, given by the arms of its nodes in its frame [m]; empty: of the rest shape.
+    ///
+    /// A cut leaves A as it was but where the mesh has changed, to the last bit, so that what is known of
+    /// its factor can be kept: the arms are never made anew for another mesh, nor are those at rest centred.
     pub(super) fn system_at(
         &mut self,
         shape: &[Point],
-        (center, frame): (DVec3, DMat3),
         masses: &[f64],
         inertia: f64,
         time_step: f64,
     ) -> &BlockMatrix {
-        self.stiff_arms.clear();
-        let to_frame = frame.transpose();
-        self.stiff_arms.extend(shape.iter().map(|&x| to_frame * (DVec3::from_array(x) - center)));
-        self.system_of_arms(masses, inertia, time_step)
+        self.stiff_shape.clear();
+        self.stiff_shape.extend_from_slice(shape);
+        let x = if shape.is_empty() { self.mesh.nodes() } else { shape };
+        self.tissue.begin_step(x, time_step);
+        self.stiffness.blocks_mut().fill([[0.0; 3]; 3]);
+        self.tissue.add_stiffness(x, &mut self.stiffness);
+        self.system.fill(&self.stiffness, masses, inertia, 1.0)
     }
 
     /// Farthest that the response to contact may move a node by deformation [m].
@@ -156,27 +147,10 @@ impl QuasiNewton {
     pub(super) fn force(&self, node: usize) -> DVec3 {
         DVec3::from_array(self.forces[node])
     }
-
-    /// Says that A is made of the stiffness at `shape`.
-    pub(super) fn set_stiff_shape(&mut self, shape: &[Point]) {
-        self.stiff_shape.clear();
-        self.stiff_shape.extend_from_slice(shape);
-    }
-
-    /// A of the shape that the arms give, in its frame.
-    fn system_of_arms(&mut self, masses: &[f64], inertia: f64, time_step: f64) -> &BlockMatrix {
-        for (x, arm) in self.x.iter_mut().zip(&self.stiff_arms) {
-            *x = arm.to_array();
-        }
-        self.tissue.begin_step(&self.x, time_step);
-        self.stiffness.blocks_mut().fill([[0.0; 3]; 3]);
-        self.tissue.add_stiffness(&self.x, &mut self.stiffness);
-        self.system.fill(&self.stiffness, masses, inertia, 1.0)
-    }
 }
 
 impl ElasticBody {
-    /// The positions whose stiffness A is made of; empty for those of the rest shape.
+    /// The shape whose stiffness A is made of, as arms in its frame [m]; empty for the rest shape.
     pub(in crate::body) fn stiff_shape(&self) -> &[Point] {
         match &self.elasticity {
             Elasticity::Nonlinear(method) => &method.stiff_shape,
@@ -199,7 +173,14 @@ impl ElasticBody {
         match std::mem::take(&mut self.elasticity) {
             Elasticity::Nonlinear(mut method) => {
                 let due = method.effort >= SLOW || self.is_deformed(&method, x);
-                let changed = due && self.take_stiffness(&mut method, x);
+                let changed = due && {
+                    method.x.clear();
+                    method.x.extend(self.arms_of(x).map(|arm| arm.to_array()));
+                    let shape = std::mem::take(&mut method.x);
+                    let changed = self.take_stiffness(&mut method, &shape);
+                    method.x = shape;
+                    changed
+                };
                 self.elasticity = Elasticity::Nonlinear(method);
                 changed
             }
@@ -212,29 +193,29 @@ impl ElasticBody {
 
     /// Whether positions `x` differ much in shape from those that A is made of.
     fn is_deformed(&self, method: &QuasiNewton, x: &[Point]) -> bool {
-        largest_change(self.arms_of(x), &method.stiff_arms) > DEFORMED
+        let change = if method.stiff_shape.is_empty() {
+            largest_change(self.arms_of(x), self.rest.iter().copied())
+        } else {
+            let shape = method.stiff_shape.iter().map(|&arm| DVec3::from_array(arm));
+            largest_change(self.arms_of(x), shape)
+        };
+        change > DEFORMED
     }
 
-    /// Makes A of the stiffness at `shape`, or of that at rest if it is empty; true if A has changed.
+    /// Makes A of the stiffness of a shape ([`QuasiNewton::system_at`]); true if A has changed.
     /// Where the matrix cannot be factored, as when a body is about to be lost, that at rest is taken.
     pub(super) fn take_stiffness(&mut self, method: &mut QuasiNewton, shape: &[Point]) -> bool {
         if method.stiff_shape == shape {
             return false;
         }
         self.step.turning_known = false;
-        method.stiff_shape.clear();
         let (inertia, time_step) = (self.inertia(), self.time_step);
-        if !shape.is_empty() {
-            let place = self.place_of(shape.iter().map(|&x| DVec3::from_array(x)));
-            let system = method.system_at(shape, place, &self.masses, inertia, time_step);
-            if self.factor.refactor(system).is_ok() {
-                method.set_stiff_shape(shape);
-                return true;
-            }
-        }
-        let system = method.system_at_rest(&self.rest, &self.masses, inertia, time_step);
-        let factored = self.factor.refactor(system);
-        debug_assert!(factored.is_ok(), "factored when the body was made");
+        let mut factored = |shape: &[Point]| {
+            let system = method.system_at(shape, &self.masses, inertia, time_step);
+            self.factor.refactor(system).is_ok()
+        };
+        let factored = factored(shape) || factored(&[]);
+        debug_assert!(factored, "that at rest was factored when the body was made");
         true
     }
 

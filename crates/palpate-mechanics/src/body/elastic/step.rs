@@ -282,7 +282,7 @@ impl ElasticBody {
         step.turns = turns && linear;
         let (arms, known) = (step.rotations.arms(), step.turning.rotations().arms());
         step.turning_known &=
-            turns && largest_change(arms.iter().copied(), known) <= SHAPE_TOLERANCE;
+            turns && largest_change(arms.iter().copied(), known.iter().copied()) <= SHAPE_TOLERANCE;
     }
 
     /// How contact forces turn the body; `None` if it is attached.
