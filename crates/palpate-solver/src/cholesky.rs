@@ -1,5 +1,6 @@
 //! The factor of a body's matrix: made once, solved every step.
 
+mod changes;
 mod elimination;
 mod half;
 mod multifrontal;
@@ -8,12 +9,14 @@ mod product;
 mod real;
 mod supernodes;
 
-use crate::ordering::{NodeOrder, OrderingMethod};
+use crate::ordering::{NONE, NodeOrder, OrderingMethod};
 use crate::{BlockMatrix, BlockPattern};
+use changes::{Contribution, Kept, Older, Plan};
 pub use half::{HalfSolution, half_products};
 use half::{HalfWorkspace, NODES, Paths};
 use multifrontal::Fronts;
 use packed::{PackedFactor, PackedWorkspace};
+use real::Real;
 use supernodes::Supernodes;
 
 /// Columns of its nodes must have 32-bit numbers.
@@ -83,6 +86,10 @@ pub struct FactorStats {
     pub bytes: usize,
     /// Number of supernodes.
     pub supernodes: usize,
+    /// Supernodes that the last factorisation computed; those that it took over are not among them.
+    pub computed: usize,
+    /// Bytes that are kept for the next change.
+    pub kept_bytes: usize,
 }
 
 /// A factored symmetric positive definite block matrix.
@@ -96,6 +103,16 @@ pub struct Cholesky {
     precision: Precision,
     packed: Packed,
     fronts: Fronts,
+    /// From the first change on.
+    kept: Option<Kept>,
+    computed: usize,
+}
+
+/// A change of another factor's matrix.
+struct Change<'a> {
+    older: &'a Cholesky,
+    /// Its supernode that each one is the same as; [`NONE`] where it is none.
+    twins: Vec<u32>,
 }
 
 /// The factor in the precision that it is solved in.
@@ -110,6 +127,16 @@ struct Probe {
     residual: f64,
     /// Estimated, relative to the solution.
     error: f64,
+}
+
+impl Packed {
+    fn single(&self) -> Option<&PackedFactor<f32>> {
+        if let Self::Single(packed) = self { Some(packed) } else { None }
+    }
+
+    fn double(&self) -> Option<&PackedFactor<f64>> {
+        if let Self::Double(packed) = self { Some(packed) } else { None }
+    }
 }
 
 impl Default for Packed {
@@ -171,6 +198,55 @@ impl Cholesky {
         precision: Precision,
         order: NodeOrder,
     ) -> Result<Self, FactorError> {
+        let mut result = Self::analysed(matrix, precision, order)?;
+        result.compute(matrix, None)?;
+        Ok(result)
+    }
+
+    /// The factor of a matrix that differs from the one of this factor in some places: what they have in
+    /// common is taken over. It is kept in the same precision, and has the same bits as
+    /// [`Cholesky::in_order`] gives it.
+    ///
+    /// `origins[node]` is the node of this factor's matrix that a node was, `None` if it is new. What
+    /// is taken over are the supernodes below and in which nothing differs, neither nodes nor their order
+    /// nor the bits of the blocks: `order` should be the one here with new nodes next to those they
+    /// come from. The first change of a factor computes all and begins to keep what the next
+    /// changes need, [`FactorStats::kept_bytes`]; so does one after a [`Cholesky::refactor`] that failed.
+    ///
+    /// # Errors
+    /// As [`Cholesky::new`]; this factor is as before.
+    ///
+    /// # Panics
+    /// If the order is one of another pattern, there is not one origin per node, or one does not exist.
+    pub fn changed(
+        &self,
+        matrix: &BlockMatrix,
+        order: NodeOrder,
+        origins: &[Option<u32>],
+    ) -> Result<Self, FactorError> {
+        assert_eq!(origins.len(), matrix.pattern().node_count(), "one origin per node");
+        let mut result = Self::analysed(matrix, self.precision, order)?;
+        let twins = match &self.kept {
+            None => vec![NONE; result.supernodes.count()],
+            Some(kept) => {
+                let place = |&node: &u32| {
+                    origins[node as usize].map_or(NONE, |old| self.places[old as usize])
+                };
+                let before: Vec<u32> = result.order.nodes.iter().map(place).collect();
+                let older = Older { supernodes: &self.supernodes, kept };
+                older.twins(&result.supernodes, matrix, &before)
+            }
+        };
+        result.compute(matrix, Some(&Change { older: self, twins }))?;
+        Ok(result)
+    }
+
+    /// Without the numbers.
+    fn analysed(
+        matrix: &BlockMatrix,
+        precision: Precision,
+        order: NodeOrder,
+    ) -> Result<Self, FactorError> {
         let pattern = std::sync::Arc::clone(matrix.pattern());
         assert_eq!(order.nodes.len(), pattern.node_count(), "an order of this pattern");
         if pattern.node_count() > MOST_NODES || order.factor_entries > u64::from(u32::MAX) {
@@ -181,23 +257,18 @@ impl Cholesky {
             places[node as usize] = place as u32;
         }
         let supernodes = Supernodes::new(&pattern, &order, &places);
-        let mut result = Self {
+        Ok(Self {
+            paths: Paths::new(&supernodes, places.len()),
             pattern,
             order,
             places,
-            paths: Paths::default(),
             supernodes,
             precision,
             packed: Packed::default(),
             fronts: Fronts::default(),
-        };
-        result.refactor(matrix)?;
-        let count = result.order.nodes.len();
-        result.paths = match &result.packed {
-            Packed::Single(packed) => Paths::new(packed, count),
-            Packed::Double(packed) => Paths::new(packed, count),
-        };
-        Ok(result)
+            kept: None,
+            computed: 0,
+        })
     }
 
     /// Factors a matrix with the pattern of the first one. After an error the factor must not be
@@ -209,31 +280,82 @@ impl Cholesky {
         if **matrix.pattern() != *self.pattern {
             return Err(FactorError::PatternChanged);
         }
+        self.compute(matrix, None)
+    }
+
+    fn compute(
+        &mut self,
+        matrix: &BlockMatrix,
+        change: Option<&Change>,
+    ) -> Result<(), FactorError> {
         if self.pattern.node_count() == 0 {
             return Ok(());
         }
-        if self.precision == Precision::Single {
+        // What an error leaves is not kept.
+        let kept = self.kept.take();
+        let keeps = change.is_some() || kept.is_some();
+        let mut contributions = kept.map_or_else(Vec::new, |kept| kept.contributions);
+        let is_single = self.precision == Precision::Single && {
             let mut packed = match std::mem::take(&mut self.packed) {
                 Packed::Single(packed) => packed,
                 Packed::Double(_) => PackedFactor::default(),
             };
-            let factored = self.fronts.factor(&self.supernodes, matrix, &mut packed);
+            let known = change.and_then(|change| Some((change, change.older.packed.single()?)));
+            let plan = self.plan(known, keeps, contributions);
+            let factored = self.factor(matrix, &mut packed, plan);
             self.packed = Packed::Single(packed);
-            factored.map_err(|place| self.not_positive(place))?;
+            contributions = factored?;
             let Probe { residual, error } = self.probe(matrix);
-            if residual < SINGLE_PROBE_TOLERANCES[0] && error < SINGLE_PROBE_TOLERANCES[1] {
-                return Ok(());
+            residual < SINGLE_PROBE_TOLERANCES[0] && error < SINGLE_PROBE_TOLERANCES[1]
+        };
+        if !is_single {
+            let mut packed = match std::mem::take(&mut self.packed) {
+                Packed::Double(packed) => packed,
+                Packed::Single(_) => PackedFactor::default(),
+            };
+            let known = change.and_then(|change| Some((change, change.older.packed.double()?)));
+            let plan = self.plan(known, keeps, contributions);
+            let factored = self.factor(matrix, &mut packed, plan);
+            self.packed = Packed::Double(packed);
+            contributions = factored?;
+            let Probe { residual, .. } = self.probe(matrix);
+            let is_accurate = residual < PROBE_TOLERANCE;
+            if !is_accurate {
+                return Err(FactorError::Inaccurate { residual });
             }
         }
-        let mut packed = match std::mem::take(&mut self.packed) {
-            Packed::Double(packed) => packed,
-            Packed::Single(_) => PackedFactor::default(),
-        };
-        let factored = self.fronts.factor(&self.supernodes, matrix, &mut packed);
-        self.packed = Packed::Double(packed);
-        factored.map_err(|place| self.not_positive(place))?;
-        let Probe { residual, .. } = self.probe(matrix);
-        if residual < PROBE_TOLERANCE { Ok(()) } else { Err(FactorError::Inaccurate { residual }) }
+        self.kept = keeps.then(|| Kept { matrix: matrix.clone(), contributions });
+        Ok(())
+    }
+
+    /// What to compute where the columns of the changed factor are `known`; `memory` is that of earlier
+    /// contributions.
+    fn plan<'a, T>(
+        &self,
+        known: Option<(&Change<'a>, &'a PackedFactor<T>)>,
+        keeps: bool,
+        memory: Vec<Option<Contribution>>,
+    ) -> Plan<'a, T> {
+        if let Some((change, packed)) = known
+            && let Some(kept) = &change.older.kept
+        {
+            return Plan::changing(&self.supernodes, &change.twins, packed, &kept.contributions);
+        }
+        if keeps { Plan::keeping(&self.supernodes, memory) } else { Plan::whole(&self.supernodes) }
+    }
+
+    /// Factors a matrix and returns the contributions that are kept for the next change.
+    fn factor<T: Real>(
+        &mut self,
+        matrix: &BlockMatrix,
+        packed: &mut PackedFactor<T>,
+        mut plan: Plan<T>,
+    ) -> Result<Vec<Option<Contribution>>, FactorError> {
+        self.computed = plan.computed_count();
+        self.fronts
+            .factor(&self.supernodes, matrix, packed, &mut plan)
+            .map_err(|place| self.not_positive(place))?;
+        Ok(plan.into_kept())
     }
 
     fn not_positive(&self, place: usize) -> FactorError {
@@ -392,6 +514,8 @@ impl Cholesky {
                 Packed::Single(packed) => packed.supernode_count(),
                 Packed::Double(packed) => packed.supernode_count(),
             },
+            computed: self.computed,
+            kept_bytes: self.kept.as_ref().map_or(0, Kept::bytes),
         }
     }
 }

@@ -12,6 +12,7 @@ use pulp::Simd;
 
 use super::packed::{PackedFactor, Panel, ROWS};
 use super::real::Real;
+use super::supernodes::Supernodes;
 
 /// Right-hand sides that go through the tree together: a whole number of vectors of any machine, and a
 /// whole number of nodes.
@@ -103,22 +104,16 @@ pub(super) struct Paths {
 }
 
 impl Paths {
-    pub(super) fn new<T: Real>(factor: &PackedFactor<T>, node_count: usize) -> Self {
-        let supernodes = &factor.supernodes;
-        let of_column =
-            |column: u32| supernodes.partition_point(|s| s.columns().end <= column as usize) as u32;
-        let first_below = |s: &super::packed::Supernode| {
-            factor.pattern[s.pattern()].first().map_or(NONE, |&row| of_column(row))
-        };
-        let parents: Vec<u32> = supernodes.iter().map(first_below).collect();
-        let mut parts = vec![(0, 0); supernodes.len()];
-        for (index, supernode) in supernodes.iter().enumerate().rev() {
-            let begin =
-                parents.get(index).filter(|&&p| p != NONE).map_or(0, |&p| parts[p as usize].1);
-            let width = supernode.columns().len().next_multiple_of(LANES);
-            parts[index] = (begin, begin + width as u32);
+    pub(super) fn new(supernodes: &Supernodes, node_count: usize) -> Self {
+        let count = supernodes.count();
+        let parents = (0..count).map(|s| supernodes.parent(s).map_or(NONE, |p| p as u32)).collect();
+        let mut parts = vec![(0, 0); count];
+        for s in (0..count).rev() {
+            let begin = supernodes.parent(s).map_or(0, |parent| parts[parent].1);
+            let width = (3 * supernodes.nodes(s).len()).next_multiple_of(LANES);
+            parts[s] = (begin, begin + width as u32);
         }
-        let of_node = (0..node_count as u32).map(|node| of_column(3 * node)).collect();
+        let of_node = (0..node_count).map(|node| supernodes.of_node(node) as u32).collect();
         Self { parents, parts, of_node }
     }
 
@@ -238,7 +233,7 @@ impl<T: Real> pulp::WithSimd for HalfPass<'_, T> {
         for &s in &work.path {
             let supernode = &factor.supernodes[s as usize];
             let row_count = supernode.row_count();
-            let mut panels = &factor.panels[supernode.panel_start as usize..];
+            let mut panels = &*supernode.panels;
             let top = &work.x[supernode.columns()];
             for first in (0..row_count).step_by(ROWS) {
                 let (panel, rest) = panels.split_at(top.len().min(first + ROWS));

@@ -4,7 +4,11 @@
 //! for the nodes above. Eliminating its columns leaves a contribution to its parent, on a stack: children
 //! stand before their parents, so that theirs are the last ones there. There are two stacks, for generations
 //! by turns, so that a contribution is put together where it stays while those of the children are read.
+//! What is kept for the next change stands outside them.
 
+use std::sync::Arc;
+
+use super::changes::{Contribution, Plan};
 use super::elimination::Elimination;
 use super::packed::PackedFactor;
 use super::product::Product;
@@ -35,11 +39,12 @@ struct Stack {
 }
 
 impl Stack {
-    fn push(&mut self, size: usize) {
+    fn push(&mut self, size: usize) -> &mut [f64] {
         self.used += size;
         if self.values.len() < self.used {
             self.values.resize(self.used, 0.0);
         }
+        self.top(size)
     }
 
     /// Takes the last `size` values off.
@@ -63,6 +68,7 @@ impl Fronts {
         supernodes: &Supernodes,
         matrix: &BlockMatrix,
         factor: &mut PackedFactor<T>,
+        plan: &mut Plan<T>,
     ) -> Result<(), usize> {
         let (mut finished, mut product) = (Vec::new(), Product::default());
         for stack in &mut self.stacks {
@@ -71,26 +77,46 @@ impl Fronts {
         self.places.resize(matrix.pattern().node_count(), 0);
         factor.clear(3 * matrix.pattern().node_count());
         for s in 0..supernodes.count() {
-            let (nodes, rows) = (supernodes.nodes(s), supernodes.rows(s));
-            let first = 3 * nodes.start;
-            self.assemble(supernodes, matrix, s);
-            let contribution = &mut self.stacks[supernodes.generation(s) % 2];
-            let contribution = contribution.top((3 * rows.len()).pow(2));
-            let width = 3 * nodes.len();
-            self.elimination
-                .eliminate(&mut self.columns, width, contribution)
-                .map_err(|column| first + column)?;
+            let (nodes, below) = (supernodes.nodes(s), 3 * supernodes.rows(s).len());
+            let (first, width) = (3 * nodes.start, 3 * nodes.len());
+            let rows = supernodes.rows(s).iter().flat_map(|&row| [0, 1, 2].map(|k| 3 * row + k));
+            if plan.is_computed[s] {
+                let mut kept = plan.is_kept[s].then(|| {
+                    let last = plan.contributions[s].take();
+                    unshared(last, below * below)
+                });
+                let own = kept.as_mut().and_then(Arc::get_mut);
+                self.assemble(supernodes, matrix, s, &plan.contributions, own);
+                let own = kept.as_mut().and_then(Arc::get_mut);
+                let stack = &mut self.stacks[supernodes.generation(s) % 2];
+                let contribution = own.unwrap_or_else(|| stack.top(below * below));
+                self.elimination
+                    .eliminate(&mut self.columns, width, contribution)
+                    .map_err(|column| first + column)?;
+                plan.contributions[s] = kept;
+            }
+            if let Some(panels) = plan.known[s] {
+                factor.push_panels(first as u32, width, rows, Arc::clone(panels));
+                continue;
+            }
             finished.clear();
             finished.extend(self.columns.iter().map(|&value| T::from_f64(value)));
             self.elimination.finish(&mut finished, width, &mut product);
-            let rows = rows.iter().flat_map(|&row| [0, 1, 2].map(|k| 3 * row + k));
             factor.push(first as u32, width, rows, &finished);
         }
         Ok(())
     }
 
-    /// Puts the front of a supernode together: columns, and the contribution on top of the stack.
-    fn assemble(&mut self, supernodes: &Supernodes, matrix: &BlockMatrix, s: usize) {
+    /// Puts the front of a supernode together: columns, and the contribution in its `own` place or on top
+    /// of the stack.
+    fn assemble(
+        &mut self,
+        supernodes: &Supernodes,
+        matrix: &BlockMatrix,
+        s: usize,
+        kept: &[Option<Contribution>],
+        own: Option<&mut [f64]>,
+    ) {
         let (nodes, rows) = (supernodes.nodes(s), supernodes.rows(s));
         let (width, below) = (3 * nodes.len(), 3 * rows.len());
         let height = width + below;
@@ -112,25 +138,37 @@ impl Fronts {
             }
         }
         let [even, odd] = &mut self.stacks;
-        let [own, others] =
+        let [stack, others] =
             if supernodes.generation(s).is_multiple_of(2) { [even, odd] } else { [odd, even] };
-        own.push(below * below);
-        let contribution = own.top(below * below);
+        let contribution = own.unwrap_or_else(|| stack.push(below * below));
         for (place, column) in contribution.chunks_exact_mut(below.max(1)).enumerate() {
             column[place / 3 * 3..].fill(0.0);
         }
         let mut front = Front { width, below, columns: &mut self.columns, contribution };
         let size = |child: u32| (3 * supernodes.rows(child as usize).len()).pow(2);
         let children = supernodes.children(s);
-        let mut waiting = others.pop(children.iter().map(|&child| size(child)).sum());
+        let on_stack = children.iter().filter(|&&child| kept[child as usize].is_none());
+        let mut waiting = others.pop(on_stack.map(|&child| size(child)).sum());
         for &child in children {
-            let (contribution, rest) = waiting.split_at(size(child));
-            waiting = rest;
+            let contribution = kept[child as usize].as_deref().unwrap_or_else(|| {
+                let (contribution, rest) = waiting.split_at(size(child));
+                waiting = rest;
+                contribution
+            });
             let rows = supernodes.rows(child as usize).iter();
             let places = rows.map(|&row| self.places[row as usize]);
             front.add(contribution, places, &mut self.stretches);
         }
     }
+}
+
+/// The memory of a contribution if no other factor shares it, else new memory.
+fn unshared(last: Option<Contribution>, size: usize) -> Contribution {
+    let mut last = last.filter(|values| values.len() == size);
+    if last.as_mut().and_then(Arc::get_mut).is_none() {
+        last = None;
+    }
+    last.unwrap_or_else(|| std::iter::repeat_n(0.0, size).collect())
 }
 
 /// A front that is put together.

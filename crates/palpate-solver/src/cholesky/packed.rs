@@ -9,6 +9,8 @@
 //! P lies in panels of [`ROWS`] rows, column after column, without the columns that are zero in the
 //! whole panel. A solve is bound by reading it once per pass, so that single precision halves its time.
 
+use std::sync::Arc;
+
 use pulp::Simd;
 
 use super::real::Real;
@@ -20,25 +22,26 @@ const LANES: usize = 16;
 
 pub(super) type Panel<T> = [T; ROWS];
 
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Supernode {
+#[derive(Debug)]
+pub(super) struct Supernode<T> {
     start: u32,
     width: u32,
     pattern_start: u32,
     pattern_end: u32,
-    pub(super) panel_start: u32,
+    /// Those of a supernode that a change has left alone are the same in both factors.
+    pub(super) panels: Arc<[Panel<T>]>,
 }
 
-impl Supernode {
-    pub(super) fn columns(self) -> std::ops::Range<usize> {
+impl<T> Supernode<T> {
+    pub(super) fn columns(&self) -> std::ops::Range<usize> {
         self.start as usize..(self.start + self.width) as usize
     }
 
-    pub(super) fn pattern(self) -> std::ops::Range<usize> {
+    pub(super) fn pattern(&self) -> std::ops::Range<usize> {
         self.pattern_start as usize..self.pattern_end as usize
     }
 
-    pub(super) fn row_count(self) -> usize {
+    pub(super) fn row_count(&self) -> usize {
         (self.width + self.pattern_end - self.pattern_start) as usize
     }
 }
@@ -46,9 +49,10 @@ impl Supernode {
 /// The packed factor of one matrix.
 #[derive(Debug, Default)]
 pub(super) struct PackedFactor<T> {
-    pub(super) supernodes: Vec<Supernode>,
+    pub(super) supernodes: Vec<Supernode<T>>,
     pub(super) pattern: Vec<u32>,
-    pub(super) panels: Vec<Panel<T>>,
+    /// Panels of the last factor, the first ones last.
+    spare: Vec<Arc<[Panel<T>]>>,
     /// Rows and columns.
     pub(super) size: usize,
     widest: usize,
@@ -69,9 +73,9 @@ impl<T: Real> PackedFactor<T> {
     /// Begins a factor of `size` columns in the memory of the last one.
     pub(super) fn clear(&mut self, size: usize) {
         self.size = size;
-        self.supernodes.clear();
+        self.spare.clear();
+        self.spare.extend(self.supernodes.drain(..).rev().map(|supernode| supernode.panels));
         self.pattern.clear();
-        self.panels.clear();
         (self.widest, self.longest) = (0, 0);
     }
 
@@ -84,30 +88,51 @@ impl<T: Real> PackedFactor<T> {
         columns: &[T],
     ) {
         let row_count = columns.len() / width;
-        let pattern_start = self.pattern.len() as u32;
-        let panel_start = self.panels.len() as u32;
-        self.pattern.extend(rows);
-        for first in (0..row_count).step_by(ROWS) {
+        let firsts = (0..row_count).step_by(ROWS);
+        let count = firsts.clone().map(|first| width.min(first + ROWS)).sum();
+        let mut shared = self.spare.pop().filter(|panels| panels.len() == count);
+        if shared.as_mut().and_then(Arc::get_mut).is_none() {
+            shared = None;
+        }
+        let zeros = || std::iter::repeat_n([T::ZERO; ROWS], count).collect();
+        let mut shared = shared.unwrap_or_else(zeros);
+        let mut panels = Arc::get_mut(&mut shared).expect("panels of this factor alone").iter_mut();
+        for first in firsts {
             let last = row_count.min(first + ROWS);
-            for column in 0..width.min(first + ROWS) {
-                let mut panel = [T::ZERO; ROWS];
-                panel[..last - first].copy_from_slice(&columns[column * row_count..][first..last]);
-                self.panels.push(panel);
+            for (column, panel) in (0..width.min(first + ROWS)).zip(&mut panels) {
+                let (rows, padding) = panel.split_at_mut(last - first);
+                rows.copy_from_slice(&columns[column * row_count..][first..last]);
+                padding.fill(T::ZERO);
             }
         }
-        self.supernodes.push(Supernode {
+        self.push_panels(start, width, rows, shared);
+    }
+
+    /// Adds a supernode whose panels are known.
+    pub(super) fn push_panels(
+        &mut self,
+        start: u32,
+        width: usize,
+        rows: impl Iterator<Item = u32>,
+        panels: Arc<[Panel<T>]>,
+    ) {
+        let pattern_start = self.pattern.len() as u32;
+        self.pattern.extend(rows);
+        let supernode = Supernode {
             start,
             width: width as u32,
             pattern_start,
             pattern_end: self.pattern.len() as u32,
-            panel_start,
-        });
+            panels,
+        };
         self.widest = self.widest.max(width);
-        self.longest = self.longest.max(row_count.next_multiple_of(ROWS));
+        self.longest = self.longest.max(supernode.row_count().next_multiple_of(ROWS));
+        self.supernodes.push(supernode);
     }
 
     pub(super) fn bytes(&self) -> usize {
-        size_of_val(&*self.panels) + size_of_val(&*self.pattern) + size_of_val(&*self.supernodes)
+        let panels = self.supernodes.iter().map(|supernode| size_of_val(&*supernode.panels));
+        panels.sum::<usize>() + size_of_val(&*self.pattern) + size_of_val(&*self.supernodes)
     }
 
     pub(super) fn supernode_count(&self) -> usize {
@@ -190,7 +215,7 @@ impl<T: Real> PackedFactor<T> {
                 continue;
             }
             let rows = work.rows.as_chunks_mut::<K>().0;
-            let mut panels = &self.panels[supernode.panel_start as usize..];
+            let mut panels = &*supernode.panels;
             for first in (0..supernode.row_count()).step_by(ROWS) {
                 let (panel, rest) = panels.split_at(width.min(first + ROWS));
                 panels = rest;
@@ -230,7 +255,7 @@ impl<T: Real> PackedFactor<T> {
             rows[row_count..row_count.next_multiple_of(ROWS)].fill([T::ZERO; K]);
             let sums = &mut work.sums[..K * width];
             sums.fill([T::ZERO; LANES]);
-            let mut panels = &self.panels[supernode.panel_start as usize..];
+            let mut panels = &*supernode.panels;
             for first in (0..row_count).step_by(ROWS) {
                 let (panel, rest) = panels.split_at(width.min(first + ROWS));
                 panels = rest;

@@ -19,9 +19,13 @@ pub(super) struct Supernodes {
     /// Children of each, ascending.
     child_starts: Vec<u32>,
     children: Vec<u32>,
+    /// Supernode of each node, and the one above each supernode; [`NONE`] at a root.
+    of_node: Vec<u32>,
+    parents: Vec<u32>,
     /// Supernodes above each.
     generations: Vec<u32>,
-    /// Blocks of the matrix by their column: row, stored block, whether it is used transposed.
+    /// Blocks of the matrix by their column, rows ascending: row, stored block, whether it is used
+    /// transposed.
     block_starts: Vec<u32>,
     blocks: Vec<(u32, u32, bool)>,
 }
@@ -87,16 +91,21 @@ impl Supernodes {
             self.blocks[next[col as usize] as usize] = block;
             next[col as usize] += 1;
         }
+        for range in self.block_starts.windows(2) {
+            self.blocks[range[0] as usize..range[1] as usize].sort_unstable();
+        }
     }
 
     /// Finds rows and children: the rows of a supernode are those of its matrix columns and of its
     /// children.
     fn find_rows(&mut self) {
         let (count, supernodes) = (self.block_starts.len() - 1, self.count());
-        let mut of_node = vec![0; count];
+        self.of_node = vec![0; count];
         for s in 0..supernodes {
-            of_node[self.nodes(s)].fill(s as u32);
+            let nodes = self.nodes(s);
+            self.of_node[nodes].fill(s as u32);
         }
+        self.parents = vec![NONE; supernodes];
         // Lists of children, the last one first.
         let (mut last_child, mut earlier) = (vec![NONE; supernodes], vec![NONE; supernodes]);
         let mut seen_by = vec![NONE; count];
@@ -130,16 +139,17 @@ impl Supernodes {
             self.children[first_child..].reverse();
             self.child_starts.push(self.children.len() as u32);
             self.rows[first..].sort_unstable();
-            if let Some(&parent) = self.rows.get(first) {
-                let parent = of_node[parent as usize] as usize;
-                earlier[s] = std::mem::replace(&mut last_child[parent], s as u32);
+            if let Some(&row) = self.rows.get(first) {
+                let parent = self.of_node[row as usize];
+                self.parents[s] = parent;
+                earlier[s] = std::mem::replace(&mut last_child[parent as usize], s as u32);
             }
             self.row_starts.push(self.rows.len() as u32);
         }
         self.generations = vec![0; supernodes];
         for s in (0..supernodes).rev() {
-            if let Some(&row) = self.rows(s).first() {
-                self.generations[s] = self.generations[of_node[row as usize] as usize] + 1;
+            if let Some(parent) = self.parent(s) {
+                self.generations[s] = self.generations[parent] + 1;
             }
         }
     }
@@ -164,6 +174,22 @@ impl Supernodes {
         &self.children[self.child_starts[s] as usize..self.child_starts[s + 1] as usize]
     }
 
+    /// The supernode above.
+    pub(super) fn parent(&self, s: usize) -> Option<usize> {
+        Some(self.parents[s]).filter(|&parent| parent != NONE).map(|parent| parent as usize)
+    }
+
+    /// The supernode of a node.
+    pub(super) fn of_node(&self, node: usize) -> usize {
+        self.of_node[node] as usize
+    }
+
+    /// Multiplications and additions of the elimination of a supernode.
+    pub(super) fn flops(&self, s: usize) -> f64 {
+        let (width, below) = (3 * self.nodes(s).len(), 3 * self.rows(s).len());
+        (below + 1..=below + width).map(|rows| (rows * rows) as f64).sum()
+    }
+
     /// How many supernodes are above.
     pub(super) fn generation(&self, s: usize) -> usize {
         self.generations[s] as usize
@@ -175,7 +201,7 @@ impl Supernodes {
         &'a self,
         matrix: &'a BlockMatrix,
         node: usize,
-    ) -> impl Iterator<Item = (u32, [[f64; 3]; 3])> + 'a {
+    ) -> impl ExactSizeIterator<Item = (u32, [[f64; 3]; 3])> + 'a {
         let range = self.block_starts[node] as usize..self.block_starts[node + 1] as usize;
         self.blocks[range].iter().map(|&(row, index, transposed)| {
             let block = &matrix.blocks()[index as usize];
