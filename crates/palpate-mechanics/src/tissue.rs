@@ -16,6 +16,7 @@
 #![allow(clippy::inline_always, clippy::needless_range_loop)]
 
 mod averaging;
+mod corners;
 mod dual;
 mod group;
 mod kernel;
@@ -37,6 +38,7 @@ use palpate_geometry::Point;
 use palpate_solver::{BlockMatrix, BlockPattern};
 
 use averaging::Averaging;
+use corners::NodeCorners;
 use group::{Batch, Group, Layout, PADDING};
 use kernel::{
     BatchInput, Corners, Energies, Forces, Pass, Product, Strains, Stresses, Task, VolumeSlopes,
@@ -44,7 +46,7 @@ use kernel::{
 };
 use law::viscosity::Viscosity;
 use law::{Lame, Law, MAX_FAMILIES, with_law};
-use stiffness::{PAIRS, Place, Places, Stiffness};
+use stiffness::{Places, Stiffness};
 use wide::{Eight, LANES};
 
 /// Lambda over mu above which volumes are averaged: that of nu = 0.45.
@@ -87,9 +89,7 @@ pub(crate) struct Tissue {
     averaging: Averaging,
     pattern: Arc<BlockPattern>,
     places: Vec<Places>,
-    /// Corners of each node: where their x force stands in the buffer, y and z follow at [`LANES`].
-    node_starts: Vec<u32>,
-    node_corners: Vec<u32>,
+    corners: NodeCorners,
     corner_forces: Vec<Corners>,
     energies: Vec<Eight>,
 }
@@ -192,15 +192,14 @@ impl Tissue {
         }
         let averaging = Averaging::new(&batches, &layout.groups, &layout.members);
         let pattern = Arc::new(BlockPattern::from_cliques(rest.len(), tetrahedra));
-        let places = layout.groups.iter().map(|group| places(&pattern, group)).collect();
-        let (node_starts, node_corners) = corners_of_nodes(&layout, rest.len());
+        let corners = NodeCorners::new(&layout, rest.len());
+        let places = stiffness::places(&pattern, &layout, &corners);
         let count = layout.groups.len();
         Self {
             averaging,
             pattern,
             places,
-            node_starts,
-            node_corners,
+            corners,
             corner_forces: vec![[[[0.0; LANES]; 3]; 4]; count],
             energies: vec![[0.0; LANES]; count],
             elements: ElementSet {
@@ -359,9 +358,8 @@ impl Tissue {
     fn gather(&self, forces: &mut [Point]) {
         let flat = self.corner_forces.as_flattened().as_flattened().as_flattened();
         for (node, force) in forces.iter_mut().enumerate() {
-            let range = self.node_starts[node] as usize..self.node_starts[node + 1] as usize;
             let mut sum = [0.0; 3];
-            for &corner in &self.node_corners[range] {
+            for &corner in self.corners.of(node) {
                 let corner = &flat[corner as usize..][..=2 * LANES];
                 sum[0] += corner[0];
                 sum[1] += corner[LANES];
@@ -394,43 +392,4 @@ fn batch(law: Law, averaged: bool, groups: std::ops::Range<usize>) -> Batch {
         let viscous = Lame { mu, lambda };
         Batch { law, viscous, averaged_lambda: 0.0, stiffness_lambda: 0.0, groups }
     }
-}
-
-fn places(pattern: &BlockPattern, group: &Group) -> Places {
-    PAIRS.map(|[row, col]| {
-        std::array::from_fn(|lane| {
-            let (a, b) = (group.corners[row][lane], group.corners[col][lane]);
-            let index = pattern.find(a.max(b), a.min(b)).expect("pattern of the tetrahedra");
-            Place { index: index as u32, transposed: a < b }
-        })
-    })
-}
-
-/// For every node where its corners stand among the corner forces, in the order of the groups.
-fn corners_of_nodes(layout: &Layout, node_count: usize) -> (Vec<u32>, Vec<u32>) {
-    let corners = || {
-        layout.groups.iter().zip(&layout.members).enumerate().flat_map(|(index, (group, members))| {
-            group.corners.iter().enumerate().flat_map(move |(corner, nodes)| {
-                let lanes = nodes.iter().zip(members).enumerate();
-                let filled = lanes.filter(|(_, (_, member))| **member != PADDING);
-                filled.map(move |(lane, (&node, _))| {
-                    (node as usize, (((4 * index + corner) * 3) * LANES + lane) as u32)
-                })
-            })
-        })
-    };
-    let mut starts = vec![0; node_count + 1];
-    for (node, _) in corners() {
-        starts[node + 1] += 1;
-    }
-    for node in 0..node_count {
-        starts[node + 1] += starts[node];
-    }
-    let mut places = vec![0; starts[node_count] as usize];
-    let mut next = starts.clone();
-    for (node, place) in corners() {
-        places[next[node] as usize] = place;
-        next[node] += 1;
-    }
-    (starts, places)
 }

@@ -103,7 +103,8 @@ impl BlockPattern {
         self.rows[range.clone()].iter().position(|&other| other == row).map(|i| range.start + i)
     }
 
-    pub(crate) fn range(&self, col: usize) -> std::ops::Range<usize> {
+    /// Storage indices of the blocks of column `col`.
+    pub fn range(&self, col: usize) -> std::ops::Range<usize> {
         self.column_starts[col] as usize..self.column_starts[col + 1] as usize
     }
 }

@@ -17,7 +17,7 @@ use crate::simulation::{
 };
 
 const MAGIC: [u8; 8] = *b"palpate\n";
-const VERSION: u32 = 6;
+const VERSION: u32 = 7;
 const HEADER: usize = 8 + 4 + 8 + 4;
 
 /// Why a checkpoint could not be written or read.

@@ -125,9 +125,8 @@ impl ElasticBody {
             (Elasticity::Linear(stiffness), factored(&system.into_matrix())?)
         } else {
             let mut method = QuasiNewton::new(body, &free_index);
-            let mut at = |shape: &[Point]| {
-                factored(method.system_at(shape, &masses, inertia, time_step))
-            };
+            let mut at =
+                |shape: &[Point]| factored(method.system_at(shape, &masses, inertia, time_step));
             // What fails in a shape does not at rest, but where the fault is not the shape's.
             let factor = at(known.shape).or_else(|_| at(&[]))?;
             (Elasticity::Nonlinear(Box::new(method)), factor)

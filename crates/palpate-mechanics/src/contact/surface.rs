@@ -14,17 +14,25 @@ struct Lists<T> {
 }
 
 impl<T: Copy + Ord> Lists<T> {
-    fn new(count: usize, mut entries: Vec<(u32, T)>) -> Self {
-        entries.sort_unstable();
-        entries.dedup();
+    /// Of entries (list, item), which must differ; items are ascending in each list.
+    fn new(count: usize, entries: &[(u32, T)]) -> Self {
         let mut starts = vec![0_u32; count + 1];
-        for &(list, _) in &entries {
+        for &(list, _) in entries {
             starts[list as usize + 1] += 1;
         }
         for list in 0..count {
             starts[list + 1] += starts[list];
         }
-        Self { starts, items: entries.into_iter().map(|(_, item)| item).collect() }
+        let mut next = starts.clone();
+        let mut items: Vec<T> = entries.iter().map(|&(_, item)| item).collect();
+        for &(list, item) in entries {
+            items[next[list as usize] as usize] = item;
+            next[list as usize] += 1;
+        }
+        for range in starts.windows(2) {
+            items[range[0] as usize..range[1] as usize].sort_unstable();
+        }
+        Self { starts, items }
     }
 
     fn get(&self, list: u32) -> &[T] {
@@ -70,7 +78,7 @@ impl Surface {
             }
         }
         let node_neighbours = edges.iter().flat_map(|&[a, b]| [(a, b), (b, a)]).collect::<Vec<_>>();
-        let edge_triangles = Lists::new(edges.len(), edge_triangles);
+        let edge_triangles = Lists::new(edges.len(), &edge_triangles);
         let closed = volume > 0.0
             && (0..edges.len() as u32).all(|edge| {
                 let [a, b] = edges[edge as usize];
@@ -83,8 +91,8 @@ impl Surface {
             });
         Self {
             mesh: Arc::clone(mesh),
-            node_triangles: Lists::new(count, node_triangles),
-            node_neighbours: Lists::new(count, node_neighbours),
+            node_triangles: Lists::new(count, &node_triangles),
+            node_neighbours: Lists::new(count, &node_neighbours),
             edge_triangles,
             node_areas,
             edge_areas,

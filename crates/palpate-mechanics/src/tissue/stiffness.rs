@@ -1,9 +1,11 @@
 //! Element stiffness: the tangent of each element, made positive semi-definite, into a block matrix.
 
+use palpate_solver::BlockPattern;
 use palpate_solver::block_matrix::Block;
 use pulp::Simd;
 
-use super::group::Group;
+use super::corners::NodeCorners;
+use super::group::{Group, Layout, PADDING};
 use super::kernel::{Elements, Task};
 use super::law::ElementLaw;
 use super::matrix::{self, Matrix};
@@ -24,6 +26,36 @@ pub(super) struct Place {
 
 /// The places of the blocks of a group; lanes that fill the group have volume 0.
 pub(super) type Places = [[Place; LANES]; 10];
+
+/// Where the blocks of every group are in the pattern of the tetrahedra.
+pub(super) fn places(
+    pattern: &BlockPattern,
+    layout: &Layout,
+    corners: &NodeCorners,
+) -> Vec<Places> {
+    let mut places = vec![[[Place::default(); LANES]; 10]; layout.groups.len()];
+    let mut blocks = vec![0; pattern.node_count()];
+    for col in 0..pattern.node_count() {
+        for (block, &row) in pattern.range(col).zip(pattern.column(col)) {
+            blocks[row as usize] = block as u32;
+        }
+        for &place in corners.of(col) {
+            let [group, corner, lane] = NodeCorners::corner_at(place);
+            let nodes = layout.groups[group].corners.map(|nodes| nodes[lane]);
+            for (other, row) in nodes.into_iter().enumerate().filter(|&(_, r)| r as usize >= col) {
+                let pair = inner_pair(corner.max(other), corner.min(other));
+                let index = blocks[row as usize];
+                places[group][pair][lane] = Place { index, transposed: other < corner };
+            }
+        }
+    }
+    for (places, members) in places.iter_mut().zip(&layout.members) {
+        for lane in (0..LANES).filter(|&lane| members[lane] == PADDING) {
+            places.iter_mut().for_each(|lanes| lanes[lane] = lanes[0]);
+        }
+    }
+    places
+}
 
 /// Adds the stiffness of each element to `blocks`.
 pub(super) struct Stiffness<'a> {
