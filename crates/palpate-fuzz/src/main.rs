@@ -11,6 +11,7 @@ mod counting_allocator;
 mod mutate;
 mod random;
 mod run;
+mod shown;
 mod targets;
 mod watchdog;
 

@@ -16,6 +16,10 @@ use crate::scene::{Frame, IntersectionOptions, Intersections, Proximity, SceneBo
 /// fill the memory.
 const MOST_CELLS: u64 = 1 << 12;
 
+/// Cells that a triangle is in on average at most: where surfaces have grown since they were measured, cells
+/// grow until it is so. Else every bucket would become a long list.
+const MEAN_CELLS: u64 = 32;
+
 /// Cells along the scene's longest side at most, so that cell numbers stay exact.
 const MOST_CELLS_ALONG: f64 = (1 << 30) as f64;
 
@@ -82,7 +86,10 @@ impl Detector for Hash {
         let stats = &mut found.stats;
         stats.all_pairs = frame.all_pairs(options.self_contact);
         self.prepare(frame);
-        let grid = Grid::new(&frame.upper.bounds(), self.mean_edge);
+        let mut grid = Grid::new(&frame.upper.bounds(), self.mean_edge);
+        while self.cells(&grid) > MEAN_CELLS * self.triangles.len() as u64 {
+            grid.cell_size *= 2.0;
+        }
         for index in 0..self.triangles.len() as u32 {
             stats.box_tests += self.insert(&grid, index, options.self_contact);
         }
@@ -138,14 +145,19 @@ impl Hash {
         self.candidates.clear();
     }
 
+    /// In how many cells the triangles are altogether.
+    fn cells(&self, grid: &Grid) -> u64 {
+        let counts = self.triangles.iter().map(|triangle| grid.count(&triangle.bounds));
+        counts.filter(|&count| count <= MOST_CELLS).sum()
+    }
+
     /// Puts a triangle into the cells of its box and pairs it with those already there; returns the
     /// number of box tests.
     fn insert(&mut self, grid: &Grid, index: u32, self_contact: bool) -> u64 {
         let own = &mut self.triangles[index as usize];
         let (first, last) = (grid.cell(own.bounds.min), grid.cell(own.bounds.max));
         own.first_cell = first;
-        let along = |axis: usize| (last[axis] - first[axis] + 1) as u64;
-        if along(0).saturating_mul(along(1)).saturating_mul(along(2)) > MOST_CELLS {
+        if grid.count(&own.bounds) > MOST_CELLS {
             self.large.push(index);
             return 0;
         }
@@ -253,6 +265,13 @@ impl Grid {
         let longest = bounds.extent().into_iter().fold(0.0, f64::max);
         let cell_size = mean_edge.max(longest / MOST_CELLS_ALONG);
         Self { origin: bounds.min, cell_size: if cell_size > 0.0 { cell_size } else { 1.0 } }
+    }
+
+    /// How many cells a box touches.
+    fn count(&self, bounds: &Aabb) -> u64 {
+        let (first, last) = (self.cell(bounds.min), self.cell(bounds.max));
+        let along = |axis: usize| (last[axis] - first[axis] + 1) as u64;
+        along(0).saturating_mul(along(1)).saturating_mul(along(2))
     }
 
     /// The cell of a point; monotone on each axis also in floating point, so that boxes which meet

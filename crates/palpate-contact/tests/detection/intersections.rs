@@ -207,6 +207,28 @@ fn a_large_triangle_among_small_ones_does_not_break_the_hash() {
     assert!(counts[0] > 0);
 }
 
+/// Cells are as large as edges were when the mesh came; triangles that grow tenfold would be in a thousand each.
+#[test]
+fn triangles_that_grow_do_not_fill_the_cells_of_the_hash() {
+    let mut random = Random(5);
+    let meshes = vec![soup(150, 4.0, &mut random), block([4, 4, 4], |p| p)];
+    let case = Case::new("grown", meshes)
+        .and(|p| p.map(|value| 10.0 * value))
+        .and(|[x, y, z]| [1e6 * x, y, z])
+        .and(|p| p.map(|value| if value > 2.0 { 1e12 * value } else { value }));
+    let counts = check(&case);
+    assert!(counts.iter().all(|&count| count > 0));
+    let mut scene =
+        scene(&case.meshes, SceneOptions { method: Method::Hash, ..SceneOptions::default() });
+    let triangles: usize = case.meshes.iter().map(|mesh| mesh.triangles().len()).sum();
+    for frame in &case.frames {
+        scene.update(&as_slices(frame)).expect("finite positions");
+        let stats = &scene.intersections(&IntersectionOptions::default()).stats;
+        assert!(stats.cell_entries <= 32 * triangles as u64, "{} entries", stats.cell_entries);
+        assert!(stats.box_tests <= stats.all_pairs);
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
 

@@ -14,6 +14,7 @@ use palpate::{Mesh, MeshData, SceneCuts};
 use super::shapes::{box_of, plate};
 use super::{Target, ensure};
 use crate::choices::Choices;
+use crate::shown::Shown;
 
 /// Calls of [`Scene`].
 pub(crate) struct SceneCalls;
@@ -323,20 +324,20 @@ impl Scenes {
         };
         let distance = choices.number();
         let self_contact = choices.flag();
+        // Answers hold floats that may be NaN where coordinates are huge.
         self.all("proximity", |scene| {
             let distance = |a: usize, b: usize| (self_contact || a != b).then_some(distance);
-            format!("{:?}", scene.proximity_with(&distance, &near).pairs)
+            Shown::new(&scene.proximity_with(&distance, &near).pairs)
         })?;
         self.all("penetration", |scene| {
-            format!("{:?}", scene.penetration(&|a, b| self_contact || a != b).nodes)
+            Shown::new(&scene.penetration(&|a, b| self_contact || a != b).nodes)
         })?;
         let points = [choices.point(), choices.small_point(), choices.small_point()];
         let directions = [choices.point(), choices.small_point(), choices.small_point()];
         let reach = choices.number();
-        // Answers hold floats that may be NaN where coordinates are huge: as text.
-        self.all("closest", |scene| format!("{:?}", scene.closest(&points, None, reach)))?;
-        self.all("contains", |scene| format!("{:?}", scene.contains(&points, None)))?;
-        self.all("cast", |scene| format!("{:?}", scene.cast(&points, &directions, None, reach)))?;
+        self.all("closest", |scene| Shown::new(&scene.closest(&points, None, reach)))?;
+        self.all("contains", |scene| Shown::new(&scene.contains(&points, None)))?;
+        self.all("cast", |scene| Shown::new(&scene.cast(&points, &directions, None, reach)))?;
         Ok(())
     }
 }
