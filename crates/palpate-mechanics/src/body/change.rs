@@ -28,7 +28,9 @@ impl MovingBody {
             [] => Vec::new(),
             shape => change.positions(shape),
         };
-        let known = Known { order: &order, shape: &shape };
+        let origins = self.elastic().map_or_else(Vec::new, |old| origins(old, body, change));
+        let factor = self.elastic().map(|old| (old.factor(), &*origins));
+        let known = Known { order: &order, shape: &shape, factor };
         let mut result = Self::new(self.index, body, gravity, time_step, known)?;
         result.positions = positions;
         result.velocities = change.positions(&self.velocities);
@@ -44,6 +46,20 @@ impl MovingBody {
     }
 }
 
+/// For each free node after a change, in the order of the nodes: which of the free nodes before it is.
+fn origins(old: &ElasticBody, body: &Body, change: &MeshChange) -> Vec<Option<u32>> {
+    let origin = |node: u32| {
+        let kept = change.nodes[node as usize].kept_node()?;
+        old.free_place(kept).map(|place| place as u32)
+    };
+    free_nodes(body, change).map(origin).collect()
+}
+
+fn free_nodes(body: &Body, change: &MeshChange) -> impl Iterator<Item = u32> {
+    let fixed = |node: &u32| body.fixed_nodes.binary_search(node).is_ok();
+    (0..change.nodes.len() as u32).filter(move |node| !fixed(node))
+}
+
 /// The free nodes after a change in the order of those before.
 fn order_after(old: &ElasticBody, body: &Body, change: &MeshChange) -> Vec<u32> {
     let mut ranks = vec![u32::MAX; old.order().len()];
@@ -55,10 +71,10 @@ fn order_after(old: &ElasticBody, body: &Body, change: &MeshChange) -> Vec<u32> 
         let free = origin.parts().filter_map(|(node, _)| old.free_place(node));
         free.map(|place| ranks[place]).min().unwrap_or(u32::MAX)
     };
-    let fixed = |node: &u32| body.fixed_nodes.binary_search(node).is_ok();
-    let free = (0..change.nodes.len() as u32).filter(|node| !fixed(node));
-    let mut order: Vec<(u32, u32)> =
-        (0..).zip(free).map(|(place, node)| (rank(&change.nodes[node as usize]), place)).collect();
+    let mut order: Vec<(u32, u32)> = (0..)
+        .zip(free_nodes(body, change))
+        .map(|(place, node)| (rank(&change.nodes[node as usize]), place))
+        .collect();
     order.sort_unstable();
     order.into_iter().map(|(_, place)| place).collect()
 }

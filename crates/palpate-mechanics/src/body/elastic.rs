@@ -66,12 +66,15 @@ enum Elasticity {
 }
 
 /// What is known of a body's matrix before it is made; nothing by default.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Default)]
 pub(crate) struct Known<'a> {
     /// Order of elimination of the free nodes.
     pub(crate) order: &'a [u32],
     /// Arms [m] of the shape whose stiffness A is to be made of, in its frame; empty: that at rest.
     pub(crate) shape: &'a [Point],
+    /// The factor of a matrix that A shares much with, and for each free node the node of that one that
+    /// it is, if any.
+    pub(crate) factor: Option<(&'a Cholesky, &'a [Option<u32>])>,
 }
 
 impl ElasticBody {
@@ -113,7 +116,11 @@ impl ElasticBody {
                 [] => NodeOrder::new(system.pattern()),
                 order => NodeOrder::given(system.pattern(), order),
             };
-            Cholesky::in_order(system, Precision::Single, order).map_err(|source| {
+            let factor = match known.factor {
+                Some((factor, origins)) => factor.changed(system, order, origins),
+                None => Cholesky::in_order(system, Precision::Single, order),
+            };
+            factor.map_err(|source| {
                 let source = in_body_numbering(source, &free_nodes);
                 MechanicsError::Factor { body: index, name: name(), source }
             })
@@ -178,6 +185,10 @@ impl ElasticBody {
     /// Order in which the free nodes are eliminated.
     pub(crate) fn order(&self) -> &[u32] {
         &self.factor.order().nodes
+    }
+
+    pub(crate) fn factor(&self) -> &Cholesky {
+        &self.factor
     }
 
     pub(crate) fn factor_stats(&self) -> FactorStats {
