@@ -3,6 +3,7 @@
 mod changes;
 mod elimination;
 mod half;
+mod memory;
 mod multifrontal;
 mod packed;
 mod product;
@@ -11,12 +12,11 @@ mod supernodes;
 
 use crate::ordering::{NONE, NodeOrder, OrderingMethod};
 use crate::{BlockMatrix, BlockPattern};
-use changes::{Contribution, Kept, Older, Plan};
+use changes::{Kept, Older, Plan};
 pub use half::{HalfSolution, half_products};
 use half::{HalfWorkspace, NODES, Paths};
-use multifrontal::Fronts;
+use memory::{Memory, SharedMemory};
 use packed::{PackedFactor, PackedWorkspace};
-use real::Real;
 use supernodes::Supernodes;
 
 /// Columns of its nodes must have 32-bit numbers.
@@ -102,7 +102,7 @@ pub struct Cholesky {
     supernodes: Supernodes,
     precision: Precision,
     packed: Packed,
-    fronts: Fronts,
+    memory: SharedMemory,
     /// From the first change on.
     kept: Option<Kept>,
     computed: usize,
@@ -168,6 +168,14 @@ macro_rules! solve {
     };
 }
 
+impl Drop for Cholesky {
+    fn drop(&mut self) {
+        if self.memory.is_shared() {
+            self.give_memory();
+        }
+    }
+}
+
 impl Cholesky {
     /// Orders, analyses and factors `matrix`, on the calling thread, and keeps it in double precision.
     ///
@@ -198,7 +206,7 @@ impl Cholesky {
         precision: Precision,
         order: NodeOrder,
     ) -> Result<Self, FactorError> {
-        let mut result = Self::analysed(matrix, precision, order)?;
+        let mut result = Self::analysed(matrix, precision, order, SharedMemory::default())?;
         result.compute(matrix, None)?;
         Ok(result)
     }
@@ -225,7 +233,7 @@ impl Cholesky {
         origins: &[Option<u32>],
     ) -> Result<Self, FactorError> {
         assert_eq!(origins.len(), matrix.pattern().node_count(), "one origin per node");
-        let mut result = Self::analysed(matrix, self.precision, order)?;
+        let mut result = Self::analysed(matrix, self.precision, order, self.memory.clone())?;
         let twins = match &self.kept {
             None => vec![NONE; result.supernodes.count()],
             Some(kept) => {
@@ -246,6 +254,7 @@ impl Cholesky {
         matrix: &BlockMatrix,
         precision: Precision,
         order: NodeOrder,
+        memory: SharedMemory,
     ) -> Result<Self, FactorError> {
         let pattern = std::sync::Arc::clone(matrix.pattern());
         assert_eq!(order.nodes.len(), pattern.node_count(), "an order of this pattern");
@@ -265,7 +274,7 @@ impl Cholesky {
             supernodes,
             precision,
             packed: Packed::default(),
-            fronts: Fronts::default(),
+            memory,
             kept: None,
             computed: 0,
         })
@@ -291,71 +300,70 @@ impl Cholesky {
         if self.pattern.node_count() == 0 {
             return Ok(());
         }
-        // What an error leaves is not kept.
-        let kept = self.kept.take();
-        let keeps = change.is_some() || kept.is_some();
-        let mut contributions = kept.map_or_else(Vec::new, |kept| kept.contributions);
+        let keeps = change.is_some() || self.kept.is_some();
+        self.give_memory();
+        let memory = self.memory.clone();
+        let mut memory = memory.lock();
+        let Memory { fronts, contributions: spare, single, double } = &mut *memory;
+        let mut contributions = Vec::new();
         let is_single = self.precision == Precision::Single && {
-            let mut packed = match std::mem::take(&mut self.packed) {
-                Packed::Single(packed) => packed,
-                Packed::Double(_) => PackedFactor::default(),
-            };
             let known = change.and_then(|change| Some((change, change.older.packed.single()?)));
-            let plan = self.plan(known, keeps, contributions);
-            let factored = self.factor(matrix, &mut packed, plan);
+            let mut plan = self.plan(known, keeps);
+            self.computed = plan.computed_count();
+            let packed = fronts
+                .factor(&self.supernodes, matrix, &mut plan, single, spare)
+                .map_err(|place| self.not_positive(place))?;
             self.packed = Packed::Single(packed);
-            contributions = factored?;
+            contributions = plan.into_kept();
             let Probe { residual, error } = self.probe(matrix);
             residual < SINGLE_PROBE_TOLERANCES[0] && error < SINGLE_PROBE_TOLERANCES[1]
         };
         if !is_single {
-            let mut packed = match std::mem::take(&mut self.packed) {
-                Packed::Double(packed) => packed,
-                Packed::Single(_) => PackedFactor::default(),
-            };
             let known = change.and_then(|change| Some((change, change.older.packed.double()?)));
-            let plan = self.plan(known, keeps, contributions);
-            let factored = self.factor(matrix, &mut packed, plan);
+            let mut plan = self.plan(known, keeps);
+            self.computed = plan.computed_count();
+            let packed = fronts
+                .factor(&self.supernodes, matrix, &mut plan, double, spare)
+                .map_err(|place| self.not_positive(place))?;
             self.packed = Packed::Double(packed);
-            contributions = factored?;
+            contributions = plan.into_kept();
             let Probe { residual, .. } = self.probe(matrix);
             let is_accurate = residual < PROBE_TOLERANCE;
             if !is_accurate {
                 return Err(FactorError::Inaccurate { residual });
             }
         }
+        memory.trim();
         self.kept = keeps.then(|| Kept { matrix: matrix.clone(), contributions });
         Ok(())
     }
 
-    /// What to compute where the columns of the changed factor are `known`; `memory` is that of earlier
-    /// contributions.
+    /// What to compute where the columns of the changed factor are `known`.
     fn plan<'a, T>(
         &self,
         known: Option<(&Change<'a>, &'a PackedFactor<T>)>,
         keeps: bool,
-        memory: Vec<Option<Contribution>>,
     ) -> Plan<'a, T> {
         if let Some((change, packed)) = known
             && let Some(kept) = &change.older.kept
         {
             return Plan::changing(&self.supernodes, &change.twins, packed, &kept.contributions);
         }
-        if keeps { Plan::keeping(&self.supernodes, memory) } else { Plan::whole(&self.supernodes) }
+        if keeps { Plan::keeping(&self.supernodes) } else { Plan::whole(&self.supernodes) }
     }
 
-    /// Factors a matrix and returns the contributions that are kept for the next change.
-    fn factor<T: Real>(
-        &mut self,
-        matrix: &BlockMatrix,
-        packed: &mut PackedFactor<T>,
-        mut plan: Plan<T>,
-    ) -> Result<Vec<Option<Contribution>>, FactorError> {
-        self.computed = plan.computed_count();
-        self.fronts
-            .factor(&self.supernodes, matrix, packed, &mut plan)
-            .map_err(|place| self.not_positive(place))?;
-        Ok(plan.into_kept())
+    /// Leaves the numbers to the next factorisation as memory.
+    fn give_memory(&mut self) {
+        let memory = &mut *self.memory.lock();
+        match &mut self.packed {
+            Packed::Single(packed) => packed.clear(&mut memory.single),
+            Packed::Double(packed) => packed.clear(&mut memory.double),
+        }
+        if let Some(kept) = self.kept.take() {
+            for contribution in kept.contributions.into_iter().flatten() {
+                memory.contributions.give(contribution);
+            }
+        }
     }
 
     fn not_positive(&self, place: usize) -> FactorError {

@@ -21,7 +21,7 @@ mod tests;
 const PARTS: f64 = 64.0;
 
 /// What a supernode leaves for its parent, which two factors may share.
-pub(super) type Contribution = Arc<[f64]>;
+pub(super) type Contribution = Arc<Vec<f64>>;
 
 /// What the next change needs of a factor.
 pub(super) struct Kept {
@@ -33,7 +33,7 @@ pub(super) struct Kept {
 impl Kept {
     pub(super) fn bytes(&self) -> usize {
         let contributions =
-            self.contributions.iter().flatten().map(|values| size_of_val(&**values));
+            self.contributions.iter().flatten().map(|values| size_of_val(&***values));
         size_of_val(self.matrix.blocks()) + contributions.sum::<usize>()
     }
 }
@@ -110,7 +110,7 @@ impl Older<'_> {
 /// What a factorisation takes over and what it keeps, by supernode.
 pub(super) struct Plan<'a, T> {
     /// Columns that are known.
-    pub(super) known: Vec<Option<&'a Arc<[Panel<T>]>>>,
+    pub(super) known: Vec<Option<&'a Arc<Vec<Panel<T>>>>>,
     pub(super) is_computed: Vec<bool>,
     pub(super) is_kept: Vec<bool>,
     /// Known to begin with, and those that are kept.
@@ -129,11 +129,9 @@ impl<'a, T> Plan<'a, T> {
         }
     }
 
-    /// Everything is computed, and what the next change needs is kept; in `memory` where that is large
-    /// enough.
-    pub(super) fn keeping(supernodes: &Supernodes, mut memory: Vec<Option<Contribution>>) -> Self {
-        memory.resize(supernodes.count(), None);
-        Self { is_kept: kept(supernodes), contributions: memory, ..Self::whole(supernodes) }
+    /// Everything is computed, and what the next change needs is kept.
+    pub(super) fn keeping(supernodes: &Supernodes) -> Self {
+        Self { is_kept: kept(supernodes), ..Self::whole(supernodes) }
     }
 
     /// What `twins` does not name is computed.
@@ -143,7 +141,7 @@ impl<'a, T> Plan<'a, T> {
         factor: &'a PackedFactor<T>,
         contributions: &[Option<Contribution>],
     ) -> Self {
-        let mut plan = Self::keeping(supernodes, Vec::new());
+        let mut plan = Self::keeping(supernodes);
         for (s, &twin) in twins.iter().enumerate().filter(|&(_, &twin)| twin != NONE) {
             plan.known[s] = Some(&factor.supernodes[twin as usize].panels);
             plan.contributions[s].clone_from(&contributions[twin as usize]);

@@ -233,7 +233,7 @@ impl<T: Real> pulp::WithSimd for HalfPass<'_, T> {
         for &s in &work.path {
             let supernode = &factor.supernodes[s as usize];
             let row_count = supernode.row_count();
-            let mut panels = &*supernode.panels;
+            let mut panels = &supernode.panels[..];
             let top = &work.x[supernode.columns()];
             for first in (0..row_count).step_by(ROWS) {
                 let (panel, rest) = panels.split_at(top.len().min(first + ROWS));

@@ -10,7 +10,8 @@ use std::sync::Arc;
 
 use super::changes::{Contribution, Plan};
 use super::elimination::Elimination;
-use super::packed::PackedFactor;
+use super::memory::Spare;
+use super::packed::{PackedFactor, Panel};
 use super::product::Product;
 use super::real::Real;
 use super::supernodes::Supernodes;
@@ -60,40 +61,37 @@ impl Stack {
 }
 
 impl Fronts {
-    /// Factors a matrix into the memory of the last factor; the column of a pivot that is not positive
-    /// if there is one. All is done in double precision but for what each supernode is turned into when
+    /// Factors a matrix in spare memory; the column of a pivot that is not positive if there is one. All is done in double precision but for what each supernode is turned into when
     /// it is finished.
     pub(super) fn factor<T: Real>(
         &mut self,
         supernodes: &Supernodes,
         matrix: &BlockMatrix,
-        factor: &mut PackedFactor<T>,
         plan: &mut Plan<T>,
-    ) -> Result<(), usize> {
+        spare: &mut Spare<Panel<T>>,
+        spare_contributions: &mut Spare<f64>,
+    ) -> Result<PackedFactor<T>, usize> {
         let (mut finished, mut product) = (Vec::new(), Product::default());
         for stack in &mut self.stacks {
             stack.used = 0;
         }
         self.places.resize(matrix.pattern().node_count(), 0);
-        factor.clear(3 * matrix.pattern().node_count());
+        let mut factor = PackedFactor::new(3 * matrix.pattern().node_count());
         for s in 0..supernodes.count() {
             let (nodes, below) = (supernodes.nodes(s), 3 * supernodes.rows(s).len());
             let (first, width) = (3 * nodes.start, 3 * nodes.len());
             let rows = supernodes.rows(s).iter().flat_map(|&row| [0, 1, 2].map(|k| 3 * row + k));
             if plan.is_computed[s] {
-                let mut kept = plan.is_kept[s].then(|| {
-                    let last = plan.contributions[s].take();
-                    unshared(last, below * below)
-                });
-                let own = kept.as_mut().and_then(Arc::get_mut);
-                self.assemble(supernodes, matrix, s, &plan.contributions, own);
-                let own = kept.as_mut().and_then(Arc::get_mut);
+                let mut kept =
+                    plan.is_kept[s].then(|| spare_contributions.take(below * below, 0.0));
+                self.assemble(supernodes, matrix, s, &plan.contributions, kept.as_deref_mut());
                 let stack = &mut self.stacks[supernodes.generation(s) % 2];
+                let own = kept.as_deref_mut();
                 let contribution = own.unwrap_or_else(|| stack.top(below * below));
                 self.elimination
                     .eliminate(&mut self.columns, width, contribution)
                     .map_err(|column| first + column)?;
-                plan.contributions[s] = kept;
+                plan.contributions[s] = kept.map(Arc::new);
             }
             if let Some(panels) = plan.known[s] {
                 factor.push_panels(first as u32, width, rows, Arc::clone(panels));
@@ -102,9 +100,9 @@ impl Fronts {
             finished.clear();
             finished.extend(self.columns.iter().map(|&value| T::from_f64(value)));
             self.elimination.finish(&mut finished, width, &mut product);
-            factor.push(first as u32, width, rows, &finished);
+            factor.push(first as u32, width, rows, &finished, spare);
         }
-        Ok(())
+        Ok(factor)
     }
 
     /// Puts the front of a supernode together: columns, and the contribution in its `own` place or on top
@@ -150,25 +148,18 @@ impl Fronts {
         let on_stack = children.iter().filter(|&&child| kept[child as usize].is_none());
         let mut waiting = others.pop(on_stack.map(|&child| size(child)).sum());
         for &child in children {
-            let contribution = kept[child as usize].as_deref().unwrap_or_else(|| {
+            let contribution = if let Some(kept) = &kept[child as usize] {
+                kept
+            } else {
                 let (contribution, rest) = waiting.split_at(size(child));
                 waiting = rest;
                 contribution
-            });
+            };
             let rows = supernodes.rows(child as usize).iter();
             let places = rows.map(|&row| self.places[row as usize]);
             front.add(contribution, places, &mut self.stretches);
         }
     }
-}
-
-/// The memory of a contribution if no other factor shares it, else new memory.
-fn unshared(last: Option<Contribution>, size: usize) -> Contribution {
-    let mut last = last.filter(|values| values.len() == size);
-    if last.as_mut().and_then(Arc::get_mut).is_none() {
-        last = None;
-    }
-    last.unwrap_or_else(|| std::iter::repeat_n(0.0, size).collect())
 }
 
 /// A front that is put together.

@@ -13,6 +13,7 @@ use std::sync::Arc;
 
 use pulp::Simd;
 
+use super::memory::Spare;
 use super::real::Real;
 
 /// Rows of a panel: one to eight vectors of any machine and precision.
@@ -29,7 +30,7 @@ pub(super) struct Supernode<T> {
     pattern_start: u32,
     pattern_end: u32,
     /// Those of a supernode that a change has left alone are the same in both factors.
-    pub(super) panels: Arc<[Panel<T>]>,
+    pub(super) panels: Arc<Vec<Panel<T>>>,
 }
 
 impl<T> Supernode<T> {
@@ -51,8 +52,6 @@ impl<T> Supernode<T> {
 pub(super) struct PackedFactor<T> {
     pub(super) supernodes: Vec<Supernode<T>>,
     pub(super) pattern: Vec<u32>,
-    /// Panels of the last factor, the first ones last.
-    spare: Vec<Arc<[Panel<T>]>>,
     /// Rows and columns.
     pub(super) size: usize,
     widest: usize,
@@ -70,13 +69,14 @@ pub(super) struct PackedWorkspace<T> {
 }
 
 impl<T: Real> PackedFactor<T> {
-    /// Begins a factor of `size` columns in the memory of the last one.
-    pub(super) fn clear(&mut self, size: usize) {
-        self.size = size;
-        self.spare.clear();
-        self.spare.extend(self.supernodes.drain(..).rev().map(|supernode| supernode.panels));
-        self.pattern.clear();
-        (self.widest, self.longest) = (0, 0);
+    /// A factor of `size` columns without any supernode.
+    pub(super) fn new(size: usize) -> Self {
+        Self { size, ..Self::default() }
+    }
+
+    /// Leaves its panels as memory.
+    pub(super) fn clear(&mut self, spare: &mut Spare<Panel<T>>) {
+        std::mem::take(self).supernodes.into_iter().for_each(|s| spare.give(s.panels));
     }
 
     /// Adds a supernode of `width` columns from `start` on: P, column after column, and the rows of B.
@@ -86,26 +86,22 @@ impl<T: Real> PackedFactor<T> {
         width: usize,
         rows: impl Iterator<Item = u32>,
         columns: &[T],
+        spare: &mut Spare<Panel<T>>,
     ) {
         let row_count = columns.len() / width;
         let firsts = (0..row_count).step_by(ROWS);
         let count = firsts.clone().map(|first| width.min(first + ROWS)).sum();
-        let mut shared = self.spare.pop().filter(|panels| panels.len() == count);
-        if shared.as_mut().and_then(Arc::get_mut).is_none() {
-            shared = None;
-        }
-        let zeros = || std::iter::repeat_n([T::ZERO; ROWS], count).collect();
-        let mut shared = shared.unwrap_or_else(zeros);
-        let mut panels = Arc::get_mut(&mut shared).expect("panels of this factor alone").iter_mut();
+        let mut panels = spare.take(count, [T::ZERO; ROWS]);
+        let mut next = panels.iter_mut();
         for first in firsts {
             let last = row_count.min(first + ROWS);
-            for (column, panel) in (0..width.min(first + ROWS)).zip(&mut panels) {
+            for (column, panel) in (0..width.min(first + ROWS)).zip(&mut next) {
                 let (rows, padding) = panel.split_at_mut(last - first);
                 rows.copy_from_slice(&columns[column * row_count..][first..last]);
                 padding.fill(T::ZERO);
             }
         }
-        self.push_panels(start, width, rows, shared);
+        self.push_panels(start, width, rows, Arc::new(panels));
     }
 
     /// Adds a supernode whose panels are known.
@@ -114,7 +110,7 @@ impl<T: Real> PackedFactor<T> {
         start: u32,
         width: usize,
         rows: impl Iterator<Item = u32>,
-        panels: Arc<[Panel<T>]>,
+        panels: Arc<Vec<Panel<T>>>,
     ) {
         let pattern_start = self.pattern.len() as u32;
         self.pattern.extend(rows);
@@ -131,7 +127,7 @@ impl<T: Real> PackedFactor<T> {
     }
 
     pub(super) fn bytes(&self) -> usize {
-        let panels = self.supernodes.iter().map(|supernode| size_of_val(&*supernode.panels));
+        let panels = self.supernodes.iter().map(|supernode| size_of_val(&**supernode.panels));
         panels.sum::<usize>() + size_of_val(&*self.pattern) + size_of_val(&*self.supernodes)
     }
 
@@ -215,7 +211,7 @@ impl<T: Real> PackedFactor<T> {
                 continue;
             }
             let rows = work.rows.as_chunks_mut::<K>().0;
-            let mut panels = &*supernode.panels;
+            let mut panels = &supernode.panels[..];
             for first in (0..supernode.row_count()).step_by(ROWS) {
                 let (panel, rest) = panels.split_at(width.min(first + ROWS));
                 panels = rest;
@@ -255,7 +251,7 @@ impl<T: Real> PackedFactor<T> {
             rows[row_count..row_count.next_multiple_of(ROWS)].fill([T::ZERO; K]);
             let sums = &mut work.sums[..K * width];
             sums.fill([T::ZERO; LANES]);
-            let mut panels = &*supernode.panels;
+            let mut panels = &supernode.panels[..];
             for first in (0..row_count).step_by(ROWS) {
                 let (panel, rest) = panels.split_at(width.min(first + ROWS));
                 panels = rest;

@@ -1,0 +1,68 @@
+//! Memory that factors leave to the next one: asking the system for it takes as long as the numbers.
+
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use super::multifrontal::Fronts;
+use super::packed::Panel;
+
+/// Memory that a factor shares with those that it was changed from.
+#[derive(Clone, Default)]
+pub(super) struct SharedMemory(Arc<Mutex<Memory>>);
+
+/// Memory for one factorisation at a time.
+#[derive(Default)]
+pub(super) struct Memory {
+    pub(super) fronts: Fronts,
+    pub(super) contributions: Spare<f64>,
+    pub(super) single: Spare<Panel<f32>>,
+    pub(super) double: Spare<Panel<f64>>,
+}
+
+impl SharedMemory {
+    pub(super) fn lock(&self) -> MutexGuard<'_, Memory> {
+        // What it holds is overwritten before it is read.
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Whether another factor can use it.
+    pub(super) fn is_shared(&self) -> bool {
+        Arc::strong_count(&self.0) > 1
+    }
+}
+
+impl Memory {
+    /// Gives back to the system what no factor has taken.
+    pub(super) fn trim(&mut self) {
+        self.contributions.0.clear();
+        self.single.0.clear();
+        self.double.0.clear();
+    }
+}
+
+/// Vectors that are not used, small ones first.
+pub(super) struct Spare<T>(Vec<Vec<T>>);
+
+impl<T> Default for Spare<T> {
+    fn default() -> Self {
+        Self(Vec::new())
+    }
+}
+
+impl<T: Copy> Spare<T> {
+    /// A vector of `size` entries of any value, `value` where they are new.
+    pub(super) fn take(&mut self, size: usize, value: T) -> Vec<T> {
+        let place = self.0.partition_point(|vector| vector.capacity() < size);
+        let fits = self.0.get(place).is_some_and(|vector| vector.capacity() <= 2 * size);
+        let mut vector = if fits { self.0.remove(place) } else { Vec::with_capacity(size) };
+        vector.resize(size, value);
+        vector
+    }
+
+    /// Takes a vector back, if nothing else uses it.
+    pub(super) fn give(&mut self, vector: Arc<Vec<T>>) {
+        if let Some(vector) = Arc::into_inner(vector) {
+            let place = self.0.partition_point(|other| other.capacity() < vector.capacity());
+            self.0.insert(place, vector);
+        }
+    }
+}
