@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::panic::{self, AssertUnwindSafe};
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
+use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use crate::counting_allocator::peak_of;
@@ -23,6 +23,8 @@ const SHORTEN: Duration = Duration::from_secs(5);
 /// Most inputs that are kept for their outcome.
 const POOL: usize = 4000;
 
+/// Counted memory and what happens at a panic are the process's: one input at a time.
+static ALONE: Mutex<()> = Mutex::new(());
 /// Where and why the last panic was.
 static PANIC: Mutex<String> = Mutex::new(String::new());
 
@@ -88,6 +90,7 @@ impl Fuzzer {
         let file = self.findings.join(format!("{}-hang", self.target.name()));
         self.watchdog.begin(input, LONGEST, file);
         let (target, scratch) = (&self.target, self.scratch.path());
+        let alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
         let hook = panic::take_hook();
         panic::set_hook(Box::new(|info| {
             let place = info.location().map(ToString::to_string).unwrap_or_default();
@@ -101,6 +104,7 @@ impl Fuzzer {
         let (result, peak) =
             peak_of(|| panic::catch_unwind(AssertUnwindSafe(|| target.try_input(input, scratch))));
         panic::set_hook(hook);
+        drop(alone);
         self.watchdog.end();
         let outcome = result
             .unwrap_or_else(|_| Err(PANIC.lock().map(|text| text.clone()).unwrap_or_default()));
