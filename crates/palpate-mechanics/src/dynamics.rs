@@ -159,7 +159,7 @@ impl Dynamics {
         check_orders(model, state)?;
         let known = |body: usize| {
             let saved = &state.bodies[body];
-            Known { order: &saved.order, shape: &saved.stiff_shape, factor: None }
+            Known { order: &saved.order, shape: &saved.stiff_shape, before: None }
         };
         let mut dynamics = Self::with_known(model, options, known)?;
         dynamics.set_state(state)?;

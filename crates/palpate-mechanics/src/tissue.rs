@@ -291,21 +291,75 @@ impl Tissue {
     /// # Panics
     /// If the matrix has another pattern than [`Tissue::pattern`].
     pub(crate) fn add_stiffness(&mut self, x: &[Point], stiffness: &mut BlockMatrix) {
+        self.find_pressures(x);
+        for batch in &self.elements.batches {
+            self.add_batch(batch, x, stiffness, &[]);
+        }
+    }
+
+    /// Writes the stiffness ([`Tissue::add_stiffness`]) between the nodes that `is_wanted` says, and nothing
+    /// else. Where volumes are averaged ([`Tissue::averages`]) that would depend on other nodes as well.
+    ///
+    /// # Panics
+    /// As [`Tissue::add_stiffness`].
+    pub(crate) fn add_stiffness_between(
+        &mut self,
+        is_wanted: &[bool],
+        x: &[Point],
+        stiffness: &mut BlockMatrix,
+    ) {
+        let pattern = Arc::clone(stiffness.pattern());
+        for col in (0..pattern.node_count()).filter(|&col| is_wanted[col]) {
+            for (index, &row) in pattern.range(col).zip(pattern.column(col)) {
+                if is_wanted[row as usize] {
+                    stiffness.blocks_mut()[index] = [[0.0; 3]; 3];
+                }
+            }
+        }
+        let groups = &self.elements.layout.groups;
+        let has_wanted = |group: &Group| {
+            group.corners.as_flattened().iter().any(|&node| is_wanted[node as usize])
+        };
+        for batch in &self.elements.batches {
+            let mut first = batch.groups.start;
+            for run in groups[batch.groups.clone()].chunk_by(|a, b| has_wanted(a) == has_wanted(b))
+            {
+                let range = first..first + run.len();
+                first = range.end;
+                if has_wanted(&run[0]) {
+                    let batch = Batch { groups: range, ..batch.clone() };
+                    self.add_batch(&batch, x, stiffness, is_wanted);
+                }
+            }
+        }
+    }
+
+    /// Adds the stiffness of groups, between the nodes that `is_wanted` says if it is not empty.
+    fn add_batch(
+        &self,
+        batch: &Batch,
+        x: &[Point],
+        stiffness: &mut BlockMatrix,
+        is_wanted: &[bool],
+    ) {
         assert!(
             Arc::ptr_eq(stiffness.pattern(), &self.pattern) || *stiffness.pattern() == self.pattern,
             "pattern of the tetrahedra"
         );
-        self.find_pressures(x);
-        for batch in &self.elements.batches {
-            let mut task = Stiffness {
-                lambda: batch.stiffness_lambda,
-                places: &self.places[batch.groups.clone()],
-                blocks: stiffness.blocks_mut(),
-                values: [[[[0.0; LANES]; 3]; 3]; 10],
-                group: 0,
-            };
-            self.elements.run(batch, x, &self.averaging.pressures, &mut task);
-        }
+        let mut task = Stiffness {
+            lambda: batch.stiffness_lambda,
+            places: &self.places[batch.groups.clone()],
+            is_wanted,
+            blocks: stiffness.blocks_mut(),
+            values: [[[[0.0; LANES]; 3]; 3]; 10],
+            group: 0,
+        };
+        self.elements.run(batch, x, &self.averaging.pressures, &mut task);
+    }
+
+    /// Whether the resistance to change of volume acts on nodal means anywhere.
+    pub(crate) fn averages(&self) -> bool {
+        self.averaging.group_count() > 0
     }
 
     /// Tetrahedra that are flat or turned inside out at positions `x` [m].

@@ -145,6 +145,43 @@ fn snapshots_and_checkpoints_hold_the_cuts() {
     }
 }
 
+/// A checkpoint makes every matrix from nothing, a cut takes over what it leaves of one.
+#[test]
+fn matrices_after_cuts_have_the_bits_of_those_made_from_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("cut.palpate");
+    let mut bent = 0;
+    for (law, poisson) in [
+        (Law::Linear, 0.4),
+        (Law::Corotated, 0.4),
+        (Law::NeoHookean, 0.45),
+        (Law::NeoHookean, 0.49),
+        (Law::HolzapfelGasserOgden, 0.4),
+    ] {
+        let mut model = model(law);
+        for body in &mut model.bodies[..2] {
+            for material in std::iter::once(&mut body.material)
+                .chain(body.regions.iter_mut().map(|(_, material)| material))
+            {
+                (material.young, material.poisson) = (4e3, poisson);
+                (material.k1, material.k2) = (5e3, 2.0);
+                material.fibres[0] = Some([0.6, 0.0, 0.8]);
+            }
+        }
+        let mut simulation = Simulation::new(model, SimulationOptions::default()).unwrap();
+        run(&mut simulation, 40);
+        for step in 0..6 {
+            cut_slowly(&mut simulation, 2 * step..2 * step + 2);
+            bent += usize::from(!simulation.snapshot().state().bodies[0].stiff_shape.is_empty());
+            simulation.save(&path).unwrap();
+            let mut loaded = Simulation::load(&path, 2).unwrap();
+            let expected = run(&mut simulation, 3);
+            assert_eq!(run(&mut loaded, 3), expected, "{law:?} {poisson}, step {step}");
+        }
+    }
+    assert!(bent >= 6, "some matrices are of other shapes than that at rest: {bent}");
+}
+
 #[test]
 fn pieces_become_bodies_of_their_own() {
     let mut simulation = start(Law::NeoHookean);

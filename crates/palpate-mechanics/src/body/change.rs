@@ -29,8 +29,8 @@ impl MovingBody {
             shape => change.positions(shape),
         };
         let origins = self.elastic().map_or_else(Vec::new, |old| origins(old, body, change));
-        let factor = self.elastic().map(|old| (old.factor(), &*origins));
-        let known = Known { order: &order, shape: &shape, factor };
+        let before = self.elastic().map(|old| (old, &*origins));
+        let known = Known { order: &order, shape: &shape, before };
         let mut result = Self::new(self.index, body, gravity, time_step, known)?;
         result.positions = positions;
         result.velocities = change.positions(&self.velocities);

@@ -72,9 +72,9 @@ pub(crate) struct Known<'a> {
     pub(crate) order: &'a [u32],
     /// Arms [m] of the shape whose stiffness A is to be made of, in its frame; empty: that at rest.
     pub(crate) shape: &'a [Point],
-    /// The factor of a matrix that A shares much with, and for each free node the node of that one that
-    /// it is, if any.
-    pub(crate) factor: Option<(&'a Cholesky, &'a [Option<u32>])>,
+    /// The body before a change of its mesh, whose A was made of the same shape, and for each free node
+    /// the one that it was, if any.
+    pub(crate) before: Option<(&'a ElasticBody, &'a [Option<u32>])>,
 }
 
 impl ElasticBody {
@@ -116,8 +116,8 @@ impl ElasticBody {
                 [] => NodeOrder::new(system.pattern()),
                 order => NodeOrder::given(system.pattern(), order),
             };
-            let factor = match known.factor {
-                Some((factor, origins)) => factor.changed(system, order, origins),
+            let factor = match known.before {
+                Some((before, origins)) => before.factor.changed(system, order, origins),
                 None => Cholesky::in_order(system, Precision::Single, order),
             };
             factor.map_err(|source| {
@@ -132,6 +132,9 @@ impl ElasticBody {
             (Elasticity::Linear(stiffness), factored(&system.into_matrix())?)
         } else {
             let mut method = QuasiNewton::new(body, &free_index);
+            if let Some(Elasticity::Nonlinear(before)) = known.before.map(|(b, _)| &b.elasticity) {
+                method.take_over(before);
+            }
             let mut at =
                 |shape: &[Point]| factored(method.system_at(shape, &masses, inertia, time_step));
             // What fails in a shape does not at rest, but where the fault is not the shape's.
@@ -185,10 +188,6 @@ impl ElasticBody {
     /// Order in which the free nodes are eliminated.
     pub(crate) fn order(&self) -> &[u32] {
         &self.factor.order().nodes
-    }
-
-    pub(crate) fn factor(&self) -> &Cholesky {
-        &self.factor
     }
 
     pub(crate) fn factor_stats(&self) -> FactorStats {

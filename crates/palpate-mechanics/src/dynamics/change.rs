@@ -69,7 +69,7 @@ impl Dynamics {
         for (index, body) in model.bodies.iter().enumerate() {
             ContactParameters::new(index, body)?;
             let saved = &state.bodies[index];
-            let known = Known { order: &saved.order, shape: &saved.stiff_shape, factor: None };
+            let known = Known { order: &saved.order, shape: &saved.stiff_shape, before: None };
             let new = || MovingBody::new(index, body, model.gravity, self.options.time_step, known);
             made.push(if self.keeps(model, state, index) { None } else { Some(new()?) });
         }

@@ -61,6 +61,8 @@ pub(super) fn places(
 pub(super) struct Stiffness<'a> {
     pub(super) lambda: f64,
     pub(super) places: &'a [Places],
+    /// Nodes between which it is added; empty: all.
+    pub(super) is_wanted: &'a [bool],
     pub(super) blocks: &'a mut [Block],
     pub(super) values: [[[Eight; 3]; 3]; 10],
     pub(super) group: usize,
@@ -98,9 +100,15 @@ impl Task for Stiffness<'_> {
 
     /// Adds the blocks tetrahedron by tetrahedron: the same sums to the last bit whatever else is in
     /// the group.
-    fn finish_group(&mut self, _: &Group) {
+    fn finish_group(&mut self, group: &Group) {
         for lane in 0..LANES {
+            let wanted = group
+                .corners
+                .map(|nodes| self.is_wanted.is_empty() || self.is_wanted[nodes[lane] as usize]);
             for (pair, [row, col]) in PAIRS.into_iter().enumerate() {
+                if !(wanted[row] && wanted[col]) {
+                    continue;
+                }
                 let (values, place) = (&self.values[pair], &self.places[self.group][pair][lane]);
                 let block = &mut self.blocks[place.index as usize];
                 for a in 0..3 {

@@ -62,6 +62,8 @@ pub(super) struct QuasiNewton {
     /// Stiffness, and A made of it, when the shape has changed.
     stiffness: BlockMatrix,
     system: SystemMatrix,
+    /// Nodes between which the stiffness is not known although it is elsewhere; empty: nothing is known.
+    unknown: Vec<bool>,
     /// Arms of the shape whose stiffness was taken, in its frame [m]; empty: at rest.
     stiff_shape: Vec<Point>,
     mesh: Arc<Mesh>,
@@ -104,6 +106,7 @@ impl QuasiNewton {
             pairs: (0..MEMORY).map(pair).collect(),
             stiffness,
             system,
+            unknown: Vec::new(),
             stiff_shape: Vec::with_capacity(node_count),
             mesh: Arc::clone(&body.mesh),
             iterations: 0,
@@ -128,9 +131,34 @@ impl QuasiNewton {
         self.stiff_shape.extend_from_slice(shape);
         let x = if shape.is_empty() { self.mesh.nodes() } else { shape };
         self.tissue.begin_step(x, time_step);
-        self.stiffness.blocks_mut().fill([[0.0; 3]; 3]);
-        self.tissue.add_stiffness(x, &mut self.stiffness);
+        let unknown = std::mem::take(&mut self.unknown);
+        if unknown.is_empty() {
+            self.stiffness.blocks_mut().fill([[0.0; 3]; 3]);
+            self.tissue.add_stiffness(x, &mut self.stiffness);
+        } else {
+            self.tissue.add_stiffness_between(&unknown, x, &mut self.stiffness);
+        }
         self.system.fill(&self.stiffness, masses, inertia, 1.0)
+    }
+
+    /// Takes over what is known of the stiffness from before a change of the mesh. The next A must be of
+    /// the shape that the last one was before.
+    pub(super) fn take_over(&mut self, before: &Self) {
+        if self.tissue.averages() {
+            return;
+        }
+        let Some(changed) = changed_nodes(&before.mesh, &self.mesh) else { return };
+        let (old, new) = (&before.stiffness, Arc::clone(self.stiffness.pattern()));
+        let blocks = self.stiffness.blocks_mut();
+        for (col, &col_changed) in changed.iter().enumerate() {
+            for (index, &row) in new.range(col).zip(new.column(col)) {
+                if !(col_changed && changed[row as usize]) {
+                    let same = old.pattern().find(row, col as u32).expect("joined before as well");
+                    blocks[index] = old.blocks()[same];
+                }
+            }
+        }
+        self.unknown = changed;
     }
 
     /// Farthest that the response to contact may move a node by deformation [m].
@@ -147,6 +175,26 @@ impl QuasiNewton {
     pub(super) fn force(&self, node: usize) -> DVec3 {
         DVec3::from_array(self.forces[node])
     }
+}
+
+/// Which nodes are new or have other tetrahedra than before; `None` where old ones are not the first ones
+/// of now.
+fn changed_nodes(old: &Mesh, new: &Mesh) -> Option<Vec<bool>> {
+    let (before, now) = (old.tetrahedra(), new.tetrahedra());
+    if new.nodes().get(..old.nodes().len()) != Some(old.nodes()) || now.len() < before.len() {
+        return None;
+    }
+    let mut changed = vec![false; new.nodes().len()];
+    changed[old.nodes().len()..].fill(true);
+    for (index, corners) in now.iter().enumerate() {
+        let old_corners = before.get(index);
+        if old_corners != Some(corners) {
+            for &node in corners.iter().chain(old_corners.into_iter().flatten()) {
+                changed[node as usize] = true;
+            }
+        }
+    }
+    Some(changed)
 }
 
 impl ElasticBody {
