@@ -44,6 +44,14 @@ impl MovingBody {
         }
         Ok(result)
     }
+
+    /// Goes on in the memory of the body before a change, for what every change makes anew.
+    pub(crate) fn take_memory(&mut self, before: Self) {
+        if let (BodyKind::Elastic(now), BodyKind::Elastic(before)) = (&mut self.kind, before.kind) {
+            now.take_memory(*before);
+        }
+        self.compliance.take_memory(before.compliance);
+    }
 }
 
 /// For each free node after a change, in the order of the nodes: which of the free nodes before it is.

@@ -160,6 +160,11 @@ impl ElasticBody {
         })
     }
 
+    /// Goes on in the memory for solves of a body that is gone.
+    pub(super) fn take_memory(&mut self, other: Self) {
+        self.step.workspace = other.step.workspace;
+    }
+
     pub(crate) fn is_free(&self, node: usize) -> bool {
         self.free_index[node] != FIXED
     }

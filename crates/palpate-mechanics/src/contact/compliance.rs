@@ -49,6 +49,12 @@ impl ComplianceCache {
         Self { surface_nodes, slot_of, limit: MEMORY_LIMIT, ..Self::default() }
     }
 
+    /// Uses the memory of another body's half solutions.
+    pub(crate) fn take_memory(&mut self, mut other: Self) {
+        self.spare.append(&mut other.halves);
+        self.spare.append(&mut other.spare);
+    }
+
     /// With another limit than the usual one.
     #[cfg(test)]
     pub(super) fn set_limit(&mut self, bytes: usize) {

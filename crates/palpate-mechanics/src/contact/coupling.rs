@@ -90,6 +90,12 @@ impl Coupling {
         self.contacts.clear();
     }
 
+    /// Gives up what it knows of the body, which is another one now.
+    pub(super) fn forget(&mut self) {
+        self.contacts.clear();
+        self.nodes.forget();
+    }
+
     /// Adds a contact; returns its place.
     pub(super) fn push(&mut self, corners: Corners) -> u32 {
         self.contacts.push(corners);

@@ -18,8 +18,8 @@ const TOGETHER: usize = 8;
 /// their slots from step to step, so that only products with new ones are made.
 #[derive(Debug, Default)]
 pub(super) struct NodeCompliance {
-    /// That of the half solutions that were multiplied.
-    version: u64,
+    /// That of the half solutions that were multiplied; `None` before there were any.
+    version: Option<u64>,
     slot_of: Vec<u32>,
     /// Slot -> node; [`NONE`] where there is none.
     nodes: Vec<u32>,
@@ -42,8 +42,8 @@ impl NodeCompliance {
     pub(super) fn gather(&mut self, body: &ElasticBody, cache: &ComplianceCache, nodes: &[u32]) {
         self.slot_of.resize(body.masses().len(), NONE);
         let limit = nodes.len() + (SPARE * nodes.len() as f64) as usize;
-        let outdated = self.version != cache.version();
-        self.version = cache.version();
+        let outdated = self.version != Some(cache.version());
+        self.version = Some(cache.version());
         if outdated || nodes.len() > self.stride || self.stride > limit.next_multiple_of(LANES) {
             self.resize(nodes.len());
         }
@@ -69,6 +69,13 @@ impl NodeCompliance {
             self.forget_unknown(cache);
             self.multiply(body, cache);
         }
+    }
+
+    /// Gives up all slots: the body is another one now.
+    pub(super) fn forget(&mut self) {
+        self.version = None;
+        self.slot_of.clear();
+        self.nodes.clear();
     }
 
     /// Gives up all slots and makes room for `count` and a few more.

@@ -141,7 +141,9 @@ impl Problem {
     /// Forgets a body's nodes and compliance.
     pub(crate) fn forget_body(&mut self, body: usize) {
         if let Some(part) = self.bodies.get_mut(body) {
-            *part = BodyPart::default();
+            part.nodes.clear();
+            part.is_contact.clear();
+            part.coupling.forget();
         }
     }
 

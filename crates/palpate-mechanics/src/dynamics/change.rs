@@ -40,7 +40,8 @@ impl Dynamics {
         let contacts: Vec<ContactForce> =
             contacts.into_iter().filter_map(|contact| moved(contact, index, &copies)).collect();
         let released = self.ties.change_body(index as u32, |node| copies[node as usize]);
-        *self.body_mut(index) = changed;
+        let before = std::mem::replace(self.body_mut(index), changed);
+        self.body_mut(index).take_memory(before);
         self.drives.change_body(index as u32, |node| copies[node as usize]);
         self.apply_drives(index);
         self.surfaces[index] = Surface::new(&body.mesh);
