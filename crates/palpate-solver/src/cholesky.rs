@@ -1,14 +1,17 @@
 //! The factor of a body's matrix: made once, solved every step.
 
+mod assembly;
 mod changes;
 mod elimination;
+mod finish;
+mod front;
 mod half;
 mod memory;
 mod multifrontal;
 mod packed;
-mod product;
 mod real;
 mod supernodes;
+mod tiles;
 
 use crate::ordering::{NONE, NodeOrder, OrderingMethod};
 use crate::{BlockMatrix, BlockPattern};

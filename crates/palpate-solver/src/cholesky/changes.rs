@@ -10,6 +10,7 @@ use std::sync::Arc;
 
 use super::packed::{PackedFactor, Panel};
 use super::supernodes::Supernodes;
+use super::tiles::Column;
 use crate::BlockMatrix;
 use crate::ordering::NONE;
 
@@ -21,7 +22,7 @@ mod tests;
 const PARTS: f64 = 64.0;
 
 /// What a supernode leaves for its parent, which two factors may share.
-pub(super) type Contribution = Arc<Vec<f64>>;
+pub(super) type Contribution = Arc<Vec<Column>>;
 
 /// What the next change needs of a factor.
 pub(super) struct Kept {

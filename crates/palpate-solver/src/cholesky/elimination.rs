@@ -1,208 +1,148 @@
-//! Elimination of the columns of a front, and what a solve needs of them. All matrices lie column after
-//! column; columns are taken in blocks, so that nearly all the work is products.
+//! Elimination of the columns of a front, tile by tile: nearly all the work is products.
 
 #![allow(clippy::inline_always)] // compiled for the vector unit of the caller
 
 use pulp::{Simd, WithSimd};
 
-use super::product::{Effect, Part, Product};
-use super::real::Real;
+use super::front::Front;
+use super::tiles::{Block, Column, GROUP, ROWS, multiply_transposed, subtract_transposed};
 
 #[cfg(test)]
 mod tests;
 
-/// Columns that are eliminated together.
-const BLOCK: usize = 32;
-/// Columns of a front that contribute together: as many as keep a tile of them in the nearest cache.
-const DEPTH: usize = 128;
-
-/// Memory for eliminations.
-#[derive(Default)]
-pub(super) struct Elimination {
-    product: Product<f64>,
-    /// Inverses of the factors of the diagonal blocks, one after the other, row after row.
-    inverses: Vec<f64>,
+/// Eliminates the columns of a front, which become those of the factor (some entries above the diagonal
+/// are overwritten), takes what they leave from its contribution and writes the inverses of the factors of
+/// the diagonal blocks.
+///
+/// # Errors
+/// With the column whose pivot is not positive.
+pub(super) fn eliminate(front: Front, inverses: &mut Vec<Block>) -> Result<(), usize> {
+    pulp::Arch::new().dispatch(Elimination { front, inverses })
 }
 
-impl Elimination {
-    /// Eliminates the columns of a front, which become those of the factor (some entries above the
-    /// diagonal are overwritten), and takes what they leave from the lower triangle of `contribution`.
-    ///
-    /// # Errors
-    /// With the column whose pivot is not positive.
-    pub(super) fn eliminate(
-        &mut self,
-        columns: &mut [f64],
-        width: usize,
-        contribution: &mut [f64],
-    ) -> Result<(), usize> {
-        let height = columns.len() / width;
-        let front = Front { columns, width, height, contribution, memory: self };
-        pulp::Arch::new().dispatch(front)
-    }
-
-    /// Turns a copy of the columns that were eliminated last into what a solve needs, [T⁻¹; B T⁻¹] for
-    /// the diagonal block's factor T and the block B below it.
-    pub(super) fn finish<T: Real>(&self, columns: &mut [T], width: usize, memory: &mut Product<T>) {
-        let height = columns.len() / width;
-        let inverses = &self.inverses;
-        pulp::Arch::new().dispatch(Finish { columns, width, height, inverses, product: memory });
-    }
+struct Elimination<'a> {
+    front: Front<'a>,
+    inverses: &'a mut Vec<Block>,
 }
 
-struct Front<'a> {
-    columns: &'a mut [f64],
-    width: usize,
-    height: usize,
-    contribution: &'a mut [f64],
-    memory: &'a mut Elimination,
-}
-
-impl WithSimd for Front<'_> {
+impl WithSimd for Elimination<'_> {
     type Output = Result<(), usize>;
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Result<(), usize> {
-        let Self { columns, width, height, contribution, memory } = self;
-        let Elimination { product, inverses } = memory;
+        let Self { front: Front { shape, columns, contribution }, inverses } = self;
+        let triangle = shape.top();
         inverses.clear();
-        for first in (0..width).step_by(BLOCK) {
-            let last = width.min(first + BLOCK);
-            let size = last - first;
-            let begin = inverses.len();
-            inverses.resize(begin + size * size, 0.0);
-            let inverse = &mut inverses[begin..];
-            factor_block(simd, &mut columns[first * height + first..], height, inverse, size)
-                .map_err(|column| first + column)?;
-            let below = Part { rows: last..height, columns: first..last };
-            product.take_left::<S, false>(columns, height, &below);
-            product.take_right(inverse, size, &Part { rows: 0..size, columns: 0..size });
-            product.apply(simd, &mut columns[first * height + last..], height, Effect::Replace);
-            if last < width {
-                let beside = Part { rows: last..width, columns: first..last };
-                product.take_left::<S, true>(columns, height, &below);
-                product.take_right_transposed(columns, height, &beside);
-                let rest = &mut columns[last * height + last..];
-                product.apply(simd, rest, height, Effect::AddBelowDiagonal);
+        inverses.resize(triangle.tile_count(), [Column::ZERO; ROWS]);
+        let (top, bottom) = columns.split_at_mut(triangle.column_count());
+        for tile in 0..triangle.tile_count() {
+            let (above, rows) = top.split_at_mut(triangle.tile(tile).start);
+            let rows = &mut rows[..triangle.tile(tile).len()];
+            for (block, inverse) in inverses[..tile].iter().enumerate() {
+                solve(simd, rows, &above[triangle.tile(block)], inverse, block);
             }
+            let (done, diagonal) = rows.split_at_mut(ROWS * tile);
+            for (group, target) in diagonal.chunks_exact_mut(GROUP).enumerate() {
+                subtract_transposed(simd, done, done, group, target);
+            }
+            let size = ROWS.min(shape.width - ROWS * tile);
+            factor_block(simd, diagonal, &mut inverses[tile], size)
+                .map_err(|column| ROWS * tile + column)?;
         }
-        for first in (0..width).step_by(DEPTH) {
-            let part = Part { rows: width..height, columns: first..width.min(first + DEPTH) };
-            product.take_left::<S, true>(columns, height, &part);
-            product.take_right_transposed(columns, height, &part);
-            product.apply(simd, contribution, height - width, Effect::AddBelowDiagonal);
+        let width = shape.bottom_width();
+        let contributions = shape.contribution();
+        for tile in 0..shape.bottom_tile_count() {
+            let (above, rows) = bottom.split_at_mut(tile * width);
+            let rows = &mut rows[..width];
+            for (block, inverse) in inverses.iter().enumerate() {
+                solve(simd, rows, &top[triangle.tile(block)], inverse, block);
+            }
+            let left = &rows[..shape.width];
+            let target = &mut contribution[contributions.tile(tile)];
+            for (block, target) in target.chunks_mut(ROWS).enumerate() {
+                let right =
+                    if block < tile { &above[block * width..][..shape.width] } else { left };
+                for (group, target) in target.chunks_exact_mut(GROUP).enumerate() {
+                    subtract_transposed(simd, left, right, group, target);
+                }
+            }
         }
         Ok(())
     }
 }
 
-struct Finish<'a, T> {
-    columns: &'a mut [T],
-    width: usize,
-    height: usize,
-    inverses: &'a [f64],
-    product: &'a mut Product<T>,
-}
-
-impl<T: Real> WithSimd for Finish<'_, T> {
-    type Output = ();
-
-    /// The rows of `X T = [1; B]`, from the last block of columns to the first.
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) {
-        let Self { columns, width, height, inverses, product } = self;
-        let mut inverse = [T::ZERO; BLOCK * BLOCK];
-        let mut end = inverses.len();
-        for first in (0..width).step_by(BLOCK).rev() {
-            let last = width.min(first + BLOCK);
-            let size = last - first;
-            let inverse = &mut inverse[..size * size];
-            for (target, &value) in inverse.iter_mut().zip(&inverses[end - size * size..end]) {
-                *target = T::from_f64(value);
-            }
-            end -= size * size;
-            let below = Part { rows: last..height, columns: first..last };
-            product.take_left::<S, false>(columns, height, &below);
-            product.take_right_transposed(inverse, size, &Part { rows: 0..size, columns: 0..size });
-            product.apply(simd, &mut columns[first * height + last..], height, Effect::Replace);
-            for column in 0..size {
-                let target = &mut columns[(first + column) * height..][..last];
-                target[..first].fill(T::ZERO);
-                for (target, row) in target[first..].iter_mut().zip(inverse.chunks_exact(size)) {
-                    *target = row[column];
-                }
-            }
-            if first > 0 {
-                let done = Part { rows: first..height, columns: first..last };
-                product.take_left::<S, true>(columns, height, &done);
-                let beside = Part { rows: first..last, columns: 0..first };
-                product.take_right(columns, height, &beside);
-                for column in columns.chunks_exact_mut(height).take(first) {
-                    column[first..last].fill(T::ZERO);
-                }
-                product.apply(simd, &mut columns[first..], height, Effect::Add);
-            }
-        }
+/// Turns a block of columns of a tile of rows into that of the factor, the ones before it being done;
+/// `above` is the tile with that block on the diagonal.
+#[inline(always)]
+fn solve<S: Simd>(simd: S, rows: &mut [Column], above: &[Column], inverse: &Block, block: usize) {
+    let (done, columns) = rows.split_at_mut(ROWS * block);
+    let count = columns.len().min(ROWS);
+    let columns = &mut columns[..count];
+    let above = &above[..ROWS * block];
+    for (group, target) in columns.chunks_exact_mut(GROUP).enumerate() {
+        subtract_transposed(simd, done, above, group, target);
     }
+    multiply_transposed(simd, columns, inverse);
 }
 
-/// Cholesky factor of a block in its lower triangle, and the inverse of that, row after row: what is done
-/// to the rows of the block is done to those of the identity.
+/// Cholesky factor of a block in its lower triangle, and the inverse of that: what is done to the rows of
+/// the block is done to those of the identity.
 #[inline(always)]
 fn factor_block<S: Simd>(
     simd: S,
-    block: &mut [f64],
-    height: usize,
-    inverse: &mut [f64],
+    columns: &mut [Column],
+    inverse: &mut Block,
     size: usize,
 ) -> Result<(), usize> {
-    let mut columns = [[0.0; BLOCK]; BLOCK];
-    let mut rows = [[0.0; BLOCK]; BLOCK];
-    for k in 0..size {
-        columns[k][k..size].copy_from_slice(&block[k * height..][k..size]);
-        rows[k][k] = 1.0;
-    }
+    let mut rows = [Column::ZERO; ROWS];
     // Whole vectors: what they change above the diagonal of the block is not read.
-    let lanes = f64::lanes::<S>();
+    let lanes = S::F64_LANES;
     let end = size.next_multiple_of(lanes);
     for k in 0..size {
-        let pivot = columns[k][k];
+        rows[k].rows_mut()[k] = 1.0;
+        let pivot = columns[k].rows()[k];
         if !(pivot > 0.0 && pivot.is_finite()) {
             return Err(k);
         }
         let root = pivot.sqrt();
-        let inverse = 1.0 / root;
+        let factor = 1.0 / root;
         let (mut column, mut row) = (columns[k], rows[k]);
         let done = (k + 1).next_multiple_of(lanes);
-        scale(simd, &mut column[k / lanes * lanes..end], inverse);
-        scale(simd, &mut row[..done], inverse);
-        column[k] = root;
+        scale(simd, &mut column.rows_mut()[k / lanes * lanes..end], factor);
+        scale(simd, &mut row.rows_mut()[..done], factor);
+        column.rows_mut()[k] = root;
         for j in k + 1..size {
-            let from = j / lanes * lanes;
-            subtract(simd, &mut columns[j][from..end], &column[from..end], column[j]);
-            subtract(simd, &mut rows[j][..done], &row[..done], column[j]);
+            let (from, factor) = (j / lanes * lanes, column.rows()[j]);
+            subtract(
+                simd,
+                &mut columns[j].rows_mut()[from..end],
+                &column.rows()[from..end],
+                factor,
+            );
+            subtract(simd, &mut rows[j].rows_mut()[..done], &row.rows()[..done], factor);
         }
         (columns[k], rows[k]) = (column, row);
     }
-    for k in 0..size {
-        block[k * height..][k..size].copy_from_slice(&columns[k][k..size]);
-        inverse[k * size..][..size].copy_from_slice(&rows[k][..size]);
+    for (k, row) in rows.iter().enumerate() {
+        for (column, &value) in inverse.iter_mut().zip(&row.rows()[..=k]) {
+            column.rows_mut()[k] = value;
+        }
     }
     Ok(())
 }
 
 #[inline(always)]
 fn scale<S: Simd>(simd: S, values: &mut [f64], factor: f64) {
-    let factor = f64::splat(simd, factor);
-    for value in f64::vectors_mut::<S>(values) {
+    let factor = simd.splat_f64s(factor);
+    for value in S::as_mut_simd_f64s(values).0 {
         *value = simd.mul_f64s(*value, factor);
     }
 }
 
 #[inline(always)]
 fn subtract<S: Simd>(simd: S, from: &mut [f64], values: &[f64], factor: f64) {
-    let factor = f64::splat(simd, -factor);
-    for (from, value) in f64::vectors_mut::<S>(from).iter_mut().zip(f64::vectors::<S>(values)) {
+    let factor = simd.splat_f64s(-factor);
+    for (from, value) in S::as_mut_simd_f64s(from).0.iter_mut().zip(S::as_simd_f64s(values).0) {
         *from = simd.mul_add_f64s(*value, factor, *from);
     }
 }

@@ -290,7 +290,7 @@ fn product<S: Simd, T: Real, const R: usize, const G: usize>(
     let mut sums = [[T::splat(simd, T::ZERO); G]; R];
     for (column, sides) in panel.iter().zip(top) {
         let sides = &T::vectors::<S>(sides)[vector..][..G];
-        for (sums, &entry) in sums.iter_mut().zip(&column[row..][..R]) {
+        for (sums, &entry) in sums.iter_mut().zip(&column.0[row..][..R]) {
             let entry = T::splat(simd, entry);
             for g in 0..G {
                 sums[g] = T::mul_add(simd, entry, sides[g], sums[g]);

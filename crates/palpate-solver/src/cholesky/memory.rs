@@ -4,6 +4,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use super::multifrontal::Fronts;
 use super::packed::Panel;
+use super::tiles::Column;
 
 /// Memory that a factor shares with those that it was changed from.
 #[derive(Clone, Default)]
@@ -13,7 +14,7 @@ pub(super) struct SharedMemory(Arc<Mutex<Memory>>);
 #[derive(Default)]
 pub(super) struct Memory {
     pub(super) fronts: Fronts,
-    pub(super) contributions: Spare<f64>,
+    pub(super) contributions: Spare<Column>,
     pub(super) single: Spare<Panel<f32>>,
     pub(super) double: Spare<Panel<f64>>,
 }

@@ -21,7 +21,13 @@ pub(super) const ROWS: usize = 32;
 /// Running sums per column in the backward pass: the longest vector.
 const LANES: usize = 16;
 
-pub(super) type Panel<T> = [T; ROWS];
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
+pub(super) struct Panel<T>(pub(super) [T; ROWS]);
+
+impl<T: Real> Panel<T> {
+    pub(super) const ZERO: Self = Self([T::ZERO; ROWS]);
+}
 
 #[derive(Debug)]
 pub(super) struct Supernode<T> {
@@ -79,33 +85,8 @@ impl<T: Real> PackedFactor<T> {
         std::mem::take(self).supernodes.into_iter().for_each(|s| spare.give(s.panels));
     }
 
-    /// Adds a supernode of `width` columns from `start` on: P, column after column, and the rows of B.
+    /// Adds a supernode of `width` columns from `start` on: the rows of B, and the panels of P.
     pub(super) fn push(
-        &mut self,
-        start: u32,
-        width: usize,
-        rows: impl Iterator<Item = u32>,
-        columns: &[T],
-        spare: &mut Spare<Panel<T>>,
-    ) {
-        let row_count = columns.len() / width;
-        let firsts = (0..row_count).step_by(ROWS);
-        let count = firsts.clone().map(|first| width.min(first + ROWS)).sum();
-        let mut panels = spare.take(count, [T::ZERO; ROWS]);
-        let mut next = panels.iter_mut();
-        for first in firsts {
-            let last = row_count.min(first + ROWS);
-            for (column, panel) in (0..width.min(first + ROWS)).zip(&mut next) {
-                let (rows, padding) = panel.split_at_mut(last - first);
-                rows.copy_from_slice(&columns[column * row_count..][first..last]);
-                padding.fill(T::ZERO);
-            }
-        }
-        self.push_panels(start, width, rows, Arc::new(panels));
-    }
-
-    /// Adds a supernode whose panels are known.
-    pub(super) fn push_panels(
         &mut self,
         start: u32,
         width: usize,
@@ -327,7 +308,7 @@ fn rows_product<S: Simd, T: Real, const K: usize, const G: usize>(
 ) {
     let mut sums = [[T::splat(simd, T::ZERO); G]; K];
     for (column, factor) in panel.iter().zip(top) {
-        let column = &T::vectors::<S>(column)[first..first + G];
+        let column = &T::vectors::<S>(&column.0)[first..first + G];
         for k in 0..K {
             let factor = T::splat(simd, factor[k]);
             for i in 0..G {
@@ -351,7 +332,7 @@ fn add_transposed_product<S: Simd, T: Real, const K: usize>(
 ) {
     let per_sum = LANES / T::lanes::<S>();
     for (column, sums) in panel.iter().zip(sums) {
-        let column = T::vectors::<S>(column);
+        let column = T::vectors::<S>(&column.0);
         for (sums, values) in sums.iter_mut().zip(values) {
             let sums = T::vectors_mut::<S>(sums);
             let values = T::vectors::<S>(values);

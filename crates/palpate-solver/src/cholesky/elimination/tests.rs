@@ -3,78 +3,148 @@
 use proptest::prelude::*;
 use pulp::WithSimd;
 
-use super::{Elimination, Finish, Front};
-use crate::cholesky::product::Product;
+use super::{Elimination, eliminate};
+use crate::cholesky::finish::{Finish, Task};
+use crate::cholesky::front::{Front, RowPlace, Shape};
+use crate::cholesky::packed::{Panel, ROWS as PANEL};
+use crate::cholesky::real::Real;
+use crate::cholesky::tiles::{Block, Column};
 
-/// The lower triangle of a positive definite front, as its first columns and the rest.
-fn front(width: usize, below: usize, seed: u64) -> (Vec<f64>, Vec<f64>) {
-    let height = width + below;
+/// The lower triangle of a positive definite front, column after column.
+fn front(shape: Shape, seed: u64) -> Vec<f64> {
+    let height = shape.width + shape.below;
     let mut state = seed | 1;
     let mut draw = || {
         state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
         (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
     };
-    let mut columns = vec![0.0; height * width];
-    for column in 0..width {
+    let mut entries = vec![0.0; height * height];
+    for column in 0..height {
         for row in column..height {
-            columns[column * height + row] = draw();
+            entries[column * height + row] = draw();
         }
-        columns[column * height + column] = height as f64;
+        entries[column * height + column] = height as f64;
     }
-    (columns, (0..below * below).map(|_| draw()).collect())
+    entries
 }
 
-struct Plain {
-    columns: Vec<f64>,
-    contribution: Vec<f64>,
-    finished: Vec<f64>,
+/// A front in tiles, and what becomes of it.
+#[derive(Clone)]
+struct Tiled {
+    shape: Shape,
+    columns: Vec<Column>,
+    contribution: Vec<Column>,
+    inverses: Vec<Block>,
 }
 
-fn eliminate_plainly(mut columns: Vec<f64>, width: usize, mut contribution: Vec<f64>) -> Plain {
-    let height = columns.len() / width;
-    let below = height - width;
+impl Tiled {
+    fn new(shape: Shape, entries: &[f64]) -> Self {
+        let mut result = Self {
+            shape,
+            columns: vec![Column::ZERO; shape.column_count()],
+            contribution: vec![Column::ZERO; shape.contribution().column_count()],
+            inverses: Vec::new(),
+        };
+        let height = shape.width + shape.below;
+        for (column, entries) in entries.chunks_exact(height).enumerate() {
+            for (row, &entry) in entries.iter().enumerate().skip(column) {
+                *result.entry(row, column) = entry;
+            }
+        }
+        result
+    }
+
+    /// An entry of the lower triangle.
+    fn entry(&mut self, row: usize, column: usize) -> &mut f64 {
+        let place = RowPlace::new(self.shape, row);
+        let column = match column.checked_sub(self.shape.width) {
+            None => &mut self.columns[place.columns + column],
+            Some(column) => &mut self.contribution[place.contribution + column],
+        };
+        &mut column.rows_mut()[place.row]
+    }
+
+    fn front(&mut self) -> Front<'_> {
+        let Self { shape, columns, contribution, .. } = self;
+        Front { shape: *shape, columns, contribution }
+    }
+
+    fn lower(&mut self) -> Vec<f64> {
+        let height = self.shape.width + self.shape.below;
+        let entries = (0..height).flat_map(|column| (column..height).map(move |row| (row, column)));
+        entries.map(|(row, column)| *self.entry(row, column)).collect()
+    }
+}
+
+/// The factor's columns with what they leave, and the rows of X from X T = [1; B].
+fn eliminate_plainly(shape: Shape, mut entries: Vec<f64>) -> (Vec<f64>, Vec<f64>) {
+    let Shape { width, below } = shape;
+    let height = width + below;
     for k in 0..width {
-        let root = columns[k * height + k].sqrt();
+        let root = entries[k * height + k].sqrt();
         for row in k..height {
-            columns[k * height + row] /= root;
+            entries[k * height + row] /= root;
         }
-        for col in k + 1..width {
+        for col in k + 1..height {
             for row in col..height {
-                columns[col * height + row] -=
-                    columns[k * height + row] * columns[k * height + col];
-            }
-        }
-        for col in 0..below {
-            for row in col..below {
-                contribution[col * below + row] -=
-                    columns[k * height + width + row] * columns[k * height + width + col];
+                entries[col * height + row] -=
+                    entries[k * height + row] * entries[k * height + col];
             }
         }
     }
-    // Every row of X from X T = [1; B].
     let mut finished = vec![0.0; height * width];
     for row in 0..height {
         for col in (0..width).rev() {
             let right = if row < width {
                 f64::from(u8::from(row == col))
             } else {
-                columns[col * height + row]
+                entries[col * height + row]
             };
             let known: f64 = (col + 1..width)
-                .map(|k| finished[k * height + row] * columns[col * height + k])
+                .map(|k| finished[k * height + row] * entries[col * height + k])
                 .sum();
-            finished[col * height + row] = (right - known) / columns[col * height + col];
+            finished[col * height + row] = (right - known) / entries[col * height + col];
         }
     }
-    Plain { columns, contribution, finished }
+    let lower = (0..height).flat_map(|column| column * height + column..(column + 1) * height);
+    (lower.map(|entry| entries[entry]).collect(), finished)
 }
 
-fn is_lower(entry: usize, height: usize) -> bool {
-    entry % height >= entry / height
+/// P of panels, column after column.
+fn unpacked<T: Real>(shape: Shape, panels: &[Panel<T>]) -> Vec<f64> {
+    let Shape { width, below } = shape;
+    let height = width + below;
+    let mut result = vec![0.0; height * width];
+    let mut panels = panels.iter();
+    for first in (0..height).step_by(PANEL) {
+        for column in 0..width.min(first + PANEL) {
+            let panel = panels.next().unwrap();
+            for row in first..height.min(first + PANEL) {
+                result[column * height + row] = panel.0[row - first].to_f64();
+            }
+            assert!(panel.0[PANEL.min(height - first)..].iter().all(|&x| x == T::ZERO));
+        }
+    }
+    assert!(panels.next().is_none());
+    result
+}
+
+fn check<T: Real>(tiled: &Tiled, exact: &[f64], tolerance: f64) {
+    let Tiled { shape, columns, inverses, .. } = tiled;
+    let panels = || vec![Panel([T::from_f64(f64::NAN); PANEL]); shape.panel_count()];
+    let (mut found, mut scalar) = (panels(), panels());
+    Finish::default().finish(*shape, columns, inverses, &mut found);
+    let (panels, memory) = (&mut scalar[..], &mut Finish::default());
+    Task { shape: *shape, columns, inverses, panels, memory }.with_simd(pulp::Scalar::new());
+    let (found, scalar) = (unpacked(*shape, &found), unpacked(*shape, &scalar));
+    for (found, exact) in found.iter().zip(exact) {
+        assert!((found - exact).abs() < tolerance, "{found} for {exact}");
+    }
+    assert!(found.iter().map(|x| x.to_bits()).eq(scalar.iter().map(|x| x.to_bits())));
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(40))]
+    #![proptest_config(ProptestConfig::with_cases(60))]
 
     #[test]
     fn a_front_is_eliminated_as_entry_by_entry(
@@ -82,61 +152,35 @@ proptest! {
         below in 0_usize..90,
         seed in any::<u64>(),
     ) {
-        let height = width + below;
-        let (given, given_rest) = front(width, below, seed);
-        let mut elimination = Elimination::default();
-        let (mut columns, mut contribution) = (given.clone(), given_rest.clone());
-        elimination.eliminate(&mut columns, width, &mut contribution).unwrap();
-        let mut finished = columns.clone();
-        elimination.finish(&mut finished, width, &mut Product::default());
-
-        let plain = eliminate_plainly(given.clone(), width, given_rest.clone());
-        for (entry, (found, exact)) in columns.iter().zip(&plain.columns).enumerate() {
-            prop_assert!(!is_lower(entry, height) || (found - exact).abs() < 1e-12);
-        }
-        for (entry, (found, exact)) in contribution.iter().zip(&plain.contribution).enumerate() {
-            prop_assert!(!is_lower(entry, below) || (found - exact).abs() < 1e-12);
-        }
-        for (found, exact) in finished.iter().zip(&plain.finished) {
+        let shape = Shape { width, below };
+        let entries = front(shape, seed);
+        let given = Tiled::new(shape, &entries);
+        let mut tiled = given.clone();
+        let mut inverses = Vec::new();
+        eliminate(tiled.front(), &mut inverses).unwrap();
+        tiled.inverses = inverses;
+        let (plain, finished) = eliminate_plainly(shape, entries);
+        for (found, exact) in tiled.lower().iter().zip(&plain) {
             prop_assert!((found - exact).abs() < 1e-12);
         }
+        check::<f64>(&tiled, &finished, 1e-12);
+        check::<f32>(&tiled, &finished, 1e-5);
 
-        let (mut scalar_columns, mut scalar_contribution) = (given, given_rest);
-        let mut memory = Elimination::default();
-        let scalar = pulp::Scalar::new();
-        Front {
-            columns: &mut scalar_columns,
-            width,
-            height,
-            contribution: &mut scalar_contribution,
-            memory: &mut memory,
-        }
-        .with_simd(scalar)
-        .unwrap();
-        let mut scalar_finished = scalar_columns.clone();
-        let mut product = Product::default();
-        Finish {
-            columns: &mut scalar_finished,
-            width,
-            height,
-            inverses: &memory.inverses,
-            product: &mut product,
-        }
-        .with_simd(scalar);
-        for (entry, (one, other)) in contribution.iter().zip(&scalar_contribution).enumerate() {
-            prop_assert!(!is_lower(entry, below) || one.to_bits() == other.to_bits());
-        }
-        for (one, other) in finished.iter().zip(&scalar_finished) {
-            prop_assert_eq!(one.to_bits(), other.to_bits());
-        }
+        let (mut scalar, mut inverses) = (given, Vec::new());
+        let task = Elimination { front: scalar.front(), inverses: &mut inverses };
+        task.with_simd(pulp::Scalar::new()).unwrap();
+        prop_assert!(inverses == tiled.inverses);
+        let (one, other) = (tiled.lower(), scalar.lower());
+        prop_assert!(one.iter().map(|x| x.to_bits()).eq(other.iter().map(|x| x.to_bits())));
     }
 
     #[test]
     fn a_pivot_that_is_not_positive_is_named(width in 1_usize..80, pivot in 0_usize..80, kind in 0..3) {
         let pivot = pivot % width;
-        let (mut columns, _) = front(width, 0, 7);
-        columns[pivot * width + pivot] = [-1.0, f64::NAN, f64::INFINITY][kind as usize];
-        let found = Elimination::default().eliminate(&mut columns, width, &mut []);
+        let shape = Shape { width, below: 5 };
+        let mut tiled = Tiled::new(shape, &front(shape, 7));
+        *tiled.entry(pivot, pivot) = [-1.0, f64::NAN, f64::INFINITY][kind as usize];
+        let found = eliminate(tiled.front(), &mut Vec::new());
         prop_assert_eq!(found, Err(pivot));
     }
 }

@@ -1,0 +1,179 @@
+//! Matrices in tiles of rows, and their products on one vector unit.
+//!
+//! A tile's columns lie one after the other, so that the innermost loop reads a factor from end to end
+//! where it stands: nothing is copied first. Each entry is summed in the order of the columns by fused
+//! operations: the same bits on any vector unit.
+
+#![allow(clippy::inline_always)] // compiled for the vector unit of the caller
+
+use std::ops::Range;
+
+use pulp::Simd;
+
+/// Rows of a tile: whole nodes, and three vectors of the longest vector unit.
+pub(super) const ROWS: usize = 24;
+/// Columns of a product that are summed together, and vectors of each: their sums fill the registers.
+pub(super) const GROUP: usize = 4;
+const VECTORS: usize = 3;
+
+/// The part of a column in a tile.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C, align(64))]
+pub(super) struct Column([[f64; GROUP]; ROWS / GROUP]);
+
+/// A square tile.
+pub(super) type Block = [Column; ROWS];
+
+impl Column {
+    pub(super) const ZERO: Self = Self([[0.0; GROUP]; ROWS / GROUP]);
+
+    pub(super) fn rows(&self) -> &[f64; ROWS] {
+        self.0.as_flattened().try_into().expect("the rows of a tile")
+    }
+
+    pub(super) fn rows_mut(&mut self) -> &mut [f64; ROWS] {
+        self.0.as_flattened_mut().try_into().expect("the rows of a tile")
+    }
+}
+
+/// The lower triangle of a square matrix: tiles of its rows, each up to its square tile on the diagonal.
+#[derive(Clone, Copy)]
+pub(super) struct Triangle {
+    /// Rows and columns.
+    pub(super) size: usize,
+}
+
+impl Triangle {
+    pub(super) fn tile_count(self) -> usize {
+        self.size.div_ceil(ROWS)
+    }
+
+    /// Where the columns of a tile are.
+    pub(super) fn tile(self, tile: usize) -> Range<usize> {
+        let start = ROWS * tile * (tile + 1) / 2;
+        start..start + (ROWS * (tile + 1)).min(self.size.next_multiple_of(GROUP))
+    }
+
+    /// Columns of all tiles.
+    pub(super) fn column_count(self) -> usize {
+        self.tile_count().checked_sub(1).map_or(0, |last| self.tile(last).end)
+    }
+}
+
+/// Sums of a product: vectors of some columns.
+type Sums<S> = [[<S as Simd>::f64s; VECTORS]; GROUP];
+
+/// Adds the products of columns of `left`, in the rows of one `part` of the tile, with numbers for each of
+/// the columns of the result.
+#[inline(always)]
+fn add_products<S: Simd>(
+    simd: S,
+    left: &[Column],
+    right: impl Iterator<Item = [f64; GROUP]>,
+    part: usize,
+    sums: &mut Sums<S>,
+) {
+    for (left, right) in left.iter().zip(right) {
+        let left = &vectors::<S>(left)[part * VECTORS..][..VECTORS];
+        for (sums, factor) in sums.iter_mut().zip(right) {
+            let factor = simd.splat_f64s(factor);
+            for (sum, &value) in sums.iter_mut().zip(left) {
+                *sum = simd.mul_add_f64s(value, factor, *sum);
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn vectors<S: Simd>(column: &Column) -> &[S::f64s] {
+    S::as_simd_f64s(column.0.as_flattened()).0
+}
+
+#[inline(always)]
+fn vectors_mut<S: Simd>(column: &mut Column) -> &mut [S::f64s] {
+    S::as_mut_simd_f64s(column.0.as_flattened_mut()).0
+}
+
+/// Parts that a tile's rows are summed in.
+#[inline(always)]
+fn parts<S: Simd>() -> usize {
+    ROWS / (VECTORS * S::F64_LANES)
+}
+
+/// Subtracts from four columns the product of `left` with the transpose of rows `GROUP * group..` of `right`.
+#[inline(always)]
+pub(super) fn subtract_transposed<S: Simd>(
+    simd: S,
+    left: &[Column],
+    right: &[Column],
+    group: usize,
+    target: &mut [Column],
+) {
+    for part in 0..parts::<S>() {
+        let mut sums = [[simd.splat_f64s(0.0); VECTORS]; GROUP];
+        let rows = right.iter().map(|column| column.0[group]);
+        add_products(simd, left, rows, part, &mut sums);
+        for (target, sums) in target.iter_mut().zip(sums) {
+            let target = &mut vectors_mut::<S>(target)[part * VECTORS..][..VECTORS];
+            for (target, sum) in target.iter_mut().zip(sums) {
+                *target = simd.sub_f64s(*target, sum);
+            }
+        }
+    }
+}
+
+/// Multiplies a tile by the transpose of a lower triangular `right`.
+#[inline(always)]
+pub(super) fn multiply_transposed<S: Simd>(simd: S, tile: &mut [Column], right: &Block) {
+    // From the last columns on: the product needs none after them.
+    for group in (0..tile.len() / GROUP).rev() {
+        let tile = &mut tile[..GROUP * (group + 1)];
+        for part in 0..parts::<S>() {
+            let mut sums = [[simd.splat_f64s(0.0); VECTORS]; GROUP];
+            let rows = right.iter().map(|column| column.0[group]);
+            add_products(simd, tile, rows, part, &mut sums);
+            for (target, sums) in tile[GROUP * group..].iter_mut().zip(sums) {
+                vectors_mut::<S>(target)[part * VECTORS..][..VECTORS].copy_from_slice(&sums);
+            }
+        }
+    }
+}
+
+/// The rows of four columns.
+#[inline(always)]
+fn numbers(columns: &[Column; GROUP]) -> impl Iterator<Item = [f64; GROUP]> {
+    let [a, b, c, d] = columns.each_ref().map(Column::rows);
+    a.iter().zip(b).zip(c.iter().zip(d)).map(|((&a, &b), (&c, &d))| [a, b, c, d])
+}
+
+/// Four columns of `-inverse * (left * right)`, `right` being some whole tiles below each other.
+#[inline(always)]
+pub(super) fn negative_products<'a, S: Simd>(
+    simd: S,
+    inverse: &Block,
+    left: &[Column],
+    right: &(impl Iterator<Item = &'a [Column; GROUP]> + Clone),
+) -> [Column; GROUP] {
+    let mut product = [Column::ZERO; GROUP];
+    for part in 0..parts::<S>() {
+        let mut sums = [[simd.splat_f64s(0.0); VECTORS]; GROUP];
+        for (left, right) in left.chunks_exact(ROWS).zip(right.clone()) {
+            add_products(simd, left, numbers(right), part, &mut sums);
+        }
+        for (target, sums) in product.iter_mut().zip(sums) {
+            vectors_mut::<S>(target)[part * VECTORS..][..VECTORS].copy_from_slice(&sums);
+        }
+    }
+    let mut result = [Column::ZERO; GROUP];
+    for part in 0..parts::<S>() {
+        let mut sums = [[simd.splat_f64s(0.0); VECTORS]; GROUP];
+        add_products(simd, inverse, numbers(&product), part, &mut sums);
+        for (target, sums) in result.iter_mut().zip(sums) {
+            let target = &mut vectors_mut::<S>(target)[part * VECTORS..][..VECTORS];
+            for (target, sum) in target.iter_mut().zip(sums) {
+                *target = simd.neg_f64s(sum);
+            }
+        }
+    }
+    result
+}
