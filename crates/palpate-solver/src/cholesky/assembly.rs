@@ -2,7 +2,9 @@
 
 #![allow(clippy::inline_always)] // compiled for the vector unit of the caller
 
-use super::front::{Front, RowPlace, Shape};
+use std::ops::Range;
+
+use super::front::{RowPlace, Shape};
 use super::supernodes::Supernodes;
 use super::tiles::{Column, ROWS, Triangle};
 use crate::BlockMatrix;
@@ -23,17 +25,27 @@ pub(super) struct Assembly {
 struct Run {
     from: usize,
     count: usize,
-    to: RowPlace,
+    /// Where the tile of the front begins.
+    tile: usize,
+    to: usize,
+}
+
+/// Part of a front.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) enum Part {
+    Columns,
+    Contribution,
 }
 
 impl Assembly {
-    /// Begins a front: zeros and the columns of the matrix.
+    /// Begins the columns of a front: zeros and those of the matrix.
     pub(super) fn begin(
         &mut self,
         supernodes: &Supernodes,
         matrix: &BlockMatrix,
         s: usize,
-        front: &mut Front,
+        shape: Shape,
+        target: &mut [Column],
     ) {
         let (nodes, rows) = (supernodes.nodes(s), supernodes.rows(s));
         self.places.resize(matrix.pattern().node_count(), 0);
@@ -41,104 +53,108 @@ impl Assembly {
         self.row_places.clear();
         for (place, node) in own.enumerate() {
             self.places[node as usize] = place as u32;
-            self.row_places.push(RowPlace::new(front.shape, 3 * place));
+            self.row_places.push(RowPlace::new(shape, 3 * place));
         }
-        front.columns.fill(Column::ZERO);
-        front.contribution.fill(Column::ZERO);
+        target.fill(Column::ZERO);
         for node in nodes.clone() {
             let first = 3 * (node - nodes.start);
             for (row, block) in supernodes.column(matrix, node) {
                 let to = &self.row_places[self.places[row as usize] as usize];
-                for (column, entries) in front.columns[to.columns + first..].iter_mut().zip(&block)
-                {
+                for (column, entries) in target[to.columns + first..].iter_mut().zip(&block) {
                     column.rows_mut()[to.row..][..3].copy_from_slice(entries);
                 }
             }
         }
     }
 
-    /// Adds what a child has left.
+    /// Adds to one part of a front what a child has left for it.
     pub(super) fn add(
         &mut self,
-        supernodes: &Supernodes,
-        child: usize,
+        rows: &[u32],
         contribution: &[Column],
-        front: &mut Front,
+        shape: Shape,
+        part: Part,
+        target: &mut [Column],
     ) {
-        let rows = supernodes.rows(child);
         let Self { places, row_places, columns, runs } = self;
         let places = rows.iter().map(|&row| places[row as usize]);
         columns.clear();
         columns.extend(places.flat_map(|place| [0, 1, 2].map(|k| 3 * place + k)));
+        let split = columns.partition_point(|&column| (column as usize) < shape.width);
+        let range = match part {
+            Part::Columns => 0..split,
+            Part::Contribution => split..columns.len(),
+        };
         pulp::Arch::new().dispatch(
             #[inline(always)]
-            || add(columns, row_places, contribution, front, runs),
+            || {
+                let first = if part == Part::Columns { 0 } else { shape.width };
+                let sum = Sum { columns, row_places, contribution, range, part, first };
+                sum.add(runs, target);
+            },
         );
     }
 }
 
-#[inline(always)]
-fn add(
-    columns: &[u32],
-    row_places: &[RowPlace],
-    contribution: &[Column],
-    front: &mut Front,
-    runs: &mut Vec<Run>,
-) {
-    let Shape { width, .. } = front.shape;
-    // Those before stand among the columns of the front, the others in its contribution.
-    let split = columns.partition_point(|&column| (column as usize) < width);
-    let triangle = Triangle { size: columns.len() };
-    for tile in 0..triangle.tile_count() {
-        let first = ROWS * tile;
-        let source = &contribution[triangle.tile(tile)];
+/// The sum of a child's contribution and one part of a front.
+struct Sum<'a> {
+    columns: &'a [u32],
+    row_places: &'a [RowPlace],
+    contribution: &'a [Column],
+    /// Columns of the child that belong to the part, and its first column in the front.
+    range: Range<usize>,
+    part: Part,
+    first: usize,
+}
+
+impl Sum<'_> {
+    #[inline(always)]
+    fn add(&self, runs: &mut Vec<Run>, target: &mut [Column]) {
+        let Self { columns, contribution, range, .. } = self;
+        let triangle = Triangle { size: columns.len() };
+        for tile in range.start / ROWS..triangle.tile_count() {
+            let first = ROWS * tile;
+            let source = &contribution[triangle.tile(tile)];
+            self.find_runs(first, runs);
+            // Blocks of columns, so that a block is read from the nearest cache for every run.
+            for begin in (range.start / ROWS * ROWS..first.min(range.end)).step_by(ROWS) {
+                let block = begin.max(range.start)..range.end.min(begin + ROWS);
+                for run in &*runs {
+                    let target = &mut target[run.tile..];
+                    run.add(&source[block.clone()], &columns[block.clone()], self.first, target);
+                }
+            }
+            // On the diagonal, the rows from the diagonal block on.
+            for node in (range.start.max(first)..range.end.min(first + ROWS)).step_by(3) {
+                let skipped = node - first;
+                for run in runs.iter().filter(|run| skipped < run.from + run.count) {
+                    let skip = skipped.saturating_sub(run.from);
+                    let rest = Run {
+                        from: run.from + skip,
+                        to: run.to + skip,
+                        count: run.count - skip,
+                        ..*run
+                    };
+                    let target = &mut target[run.tile..];
+                    rest.add(&source[node..node + 3], &columns[node..node + 3], self.first, target);
+                }
+            }
+        }
+    }
+
+    /// Finds the runs among the rows of a tile.
+    #[inline(always)]
+    fn find_runs(&self, first: usize, runs: &mut Vec<Run>) {
         runs.clear();
-        for (node, rows) in columns[first..].chunks_exact(3).take(ROWS / 3).enumerate() {
-            let to = row_places[rows[0] as usize / 3];
+        for (node, rows) in self.columns[first..].chunks_exact(3).take(ROWS / 3).enumerate() {
+            let place = self.row_places[rows[0] as usize / 3];
+            let tile = match self.part {
+                Part::Columns => place.columns,
+                Part::Contribution => place.contribution,
+            };
             match runs.last_mut() {
-                Some(run) if run.to.columns == to.columns && run.to.row + run.count == to.row => {
-                    run.count += 3;
-                }
-                _ => runs.push(Run { from: 3 * node, count: 3, to }),
-            }
-        }
-        // Blocks of columns, so that a block is read from the nearest cache for every run.
-        for begin in (0..first).step_by(ROWS) {
-            let middle = split.clamp(begin, begin + ROWS);
-            for run in &*runs {
-                let target = &mut front.columns[run.to.columns..];
-                run.add(&source[begin..middle], &columns[begin..middle], target);
-                if middle < begin + ROWS {
-                    let target = &mut front.contribution[run.to.contribution..];
-                    let columns = &columns[middle..begin + ROWS];
-                    run.add_below(&source[middle..begin + ROWS], columns, width, target);
-                }
-            }
-        }
-        // On the diagonal, the rows from the diagonal block on.
-        for (node, columns) in columns[first..].chunks_exact(3).take(ROWS / 3).enumerate() {
-            let source = &source[first + 3 * node..][..3];
-            for run in &*runs {
-                let skip = (3 * node).saturating_sub(run.from);
-                if skip >= run.count {
-                    continue;
-                }
-                let (from, to, count) = (run.from + skip, run.to.row + skip, run.count - skip);
-                let target = if (columns[0] as usize) < width {
-                    &mut front.columns[run.to.columns + columns[0] as usize..][..3]
-                } else {
-                    &mut front.contribution[run.to.contribution + columns[0] as usize - width..]
-                        [..3]
-                };
-                for (target, source) in target.iter_mut().zip(source) {
-                    let target = target.rows_mut()[to..][..count].as_chunks_mut::<3>().0;
-                    let source = source.rows()[from..][..count].as_chunks::<3>().0;
-                    for (target, source) in target.iter_mut().zip(source) {
-                        for k in 0..3 {
-                            target[k] += source[k];
-                        }
-                    }
-                }
+                Some(run) if run.tile == tile && run.to + run.count == place.row => run.count += 3,
+                _ => runs.push(Run { from: 3 * node, count: 3, tile, to: place.row }),
             }
         }
     }
@@ -146,21 +162,16 @@ fn add(
 
 impl Run {
     #[inline(always)]
-    fn add(&self, source: &[Column], columns: &[u32], target: &mut [Column]) {
-        self.add_below(source, columns, 0, target);
-    }
-
-    #[inline(always)]
-    fn add_below(&self, source: &[Column], columns: &[u32], width: usize, target: &mut [Column]) {
+    fn add(&self, source: &[Column], columns: &[u32], first: usize, target: &mut [Column]) {
         match self.count {
-            3 => self.add_rows::<3>(source, columns, width, target),
-            6 => self.add_rows::<6>(source, columns, width, target),
-            9 => self.add_rows::<9>(source, columns, width, target),
-            12 => self.add_rows::<12>(source, columns, width, target),
-            15 => self.add_rows::<15>(source, columns, width, target),
-            18 => self.add_rows::<18>(source, columns, width, target),
-            21 => self.add_rows::<21>(source, columns, width, target),
-            _ => self.add_rows::<24>(source, columns, width, target),
+            3 => self.add_rows::<3>(source, columns, first, target),
+            6 => self.add_rows::<6>(source, columns, first, target),
+            9 => self.add_rows::<9>(source, columns, first, target),
+            12 => self.add_rows::<12>(source, columns, first, target),
+            15 => self.add_rows::<15>(source, columns, first, target),
+            18 => self.add_rows::<18>(source, columns, first, target),
+            21 => self.add_rows::<21>(source, columns, first, target),
+            _ => self.add_rows::<24>(source, columns, first, target),
         }
     }
 
@@ -169,13 +180,13 @@ impl Run {
         &self,
         source: &[Column],
         columns: &[u32],
-        width: usize,
+        first: usize,
         target: &mut [Column],
     ) {
         for (source, &column) in source.iter().zip(columns) {
             let source: &[f64; N] = source.rows()[self.from..].first_chunk().expect("a run");
-            let target = target[column as usize - width].rows_mut();
-            let target: &mut [f64; N] = target[self.to.row..].first_chunk_mut().expect("a run");
+            let target = target[column as usize - first].rows_mut();
+            let target: &mut [f64; N] = target[self.to..].first_chunk_mut().expect("a run");
             for (sum, value) in target.iter_mut().zip(source) {
                 *sum += value;
             }

@@ -5,14 +5,16 @@
 use pulp::{Simd, WithSimd};
 
 use super::front::Front;
-use super::tiles::{Block, Column, GROUP, ROWS, multiply_transposed, subtract_transposed};
+use super::tiles::{
+    Block, Column, GROUP, ROWS, multiply_transposed, negative_transposed, subtract_transposed,
+};
 
 #[cfg(test)]
 mod tests;
 
 /// Eliminates the columns of a front, which become those of the factor (some entries above the diagonal
-/// are overwritten), takes what they leave from its contribution and writes the inverses of the factors of
-/// the diagonal blocks.
+/// are overwritten), and writes what they take from the rows below and the inverses of the factors of the
+/// diagonal blocks.
 ///
 /// # Errors
 /// With the column whose pivot is not positive.
@@ -63,7 +65,7 @@ impl WithSimd for Elimination<'_> {
                 let right =
                     if block < tile { &above[block * width..][..shape.width] } else { left };
                 for (group, target) in target.chunks_exact_mut(GROUP).enumerate() {
-                    subtract_transposed(simd, left, right, group, target);
+                    negative_transposed(simd, left, right, group, target);
                 }
             }
         }
@@ -74,7 +76,13 @@ impl WithSimd for Elimination<'_> {
 /// Turns a block of columns of a tile of rows into that of the factor, the ones before it being done;
 /// `above` is the tile with that block on the diagonal.
 #[inline(always)]
-fn solve<S: Simd>(simd: S, rows: &mut [Column], above: &[Column], inverse: &Block, block: usize) {
+pub(super) fn solve<S: Simd>(
+    simd: S,
+    rows: &mut [Column],
+    above: &[Column],
+    inverse: &Block,
+    block: usize,
+) {
     let (done, columns) = rows.split_at_mut(ROWS * block);
     let count = columns.len().min(ROWS);
     let columns = &mut columns[..count];

@@ -5,10 +5,11 @@
 
 use pulp::{Simd, WithSimd};
 
+use super::elimination::solve;
 use super::front::Shape;
 use super::packed::{Panel, ROWS as PANEL};
 use super::real::Real;
-use super::tiles::{Block, Column, GROUP, ROWS, negative_products};
+use super::tiles::{Block, Column, ROWS};
 
 /// Columns of a product that are summed together, and vectors of each: their sums fill the registers.
 const COLUMNS: usize = 6;
@@ -17,9 +18,9 @@ const VECTORS: usize = 2;
 /// Memory for finishing.
 #[derive(Default)]
 pub(super) struct Finish<T> {
-    /// T⁻¹, a triangle of tiles.
+    /// The transpose of T⁻¹ in tiles of its rows; those before the diagonal are not used.
     inverse: Vec<Column>,
-    /// The same, for some columns at a time row after row, from their first one on.
+    /// T⁻¹, for some columns at a time row after row, from their first one on.
     right: Vec<[T; COLUMNS]>,
 }
 
@@ -50,28 +51,24 @@ impl<T: Real> WithSimd for Task<'_, T> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
         let Self { shape, columns, inverses, panels, memory } = self;
-        let (triangle, width) = (shape.top(), shape.width);
-        invert(simd, shape, columns, inverses, &mut memory.inverse);
-        for panel in &mut *panels {
-            panel.0 = [T::ZERO; PANEL];
-        }
-        for tile in 0..triangle.tile_count() {
-            let rows = ROWS * tile..width.min(ROWS * (tile + 1));
-            let columns = &memory.inverse[triangle.tile(tile)];
-            let columns = &columns[..columns.len().min(width)];
-            copy_rows(columns, rows, width, panels);
-        }
+        let (width, first) = (shape.width, shape.width / PANEL);
+        memory.invert(simd, shape, columns, inverses);
+        // The rows of the square in the first panel with others are those of the identity times T⁻¹.
+        let start = panel_start(width, first);
+        let whole = if shape.below == 0 { width } else { first * PANEL };
+        memory.copy_inverse(shape, whole, panels);
         if shape.below == 0 {
             return;
         }
-        // The rows of the square in the first panel with others are those of the identity times T⁻¹.
-        let first = width / PANEL;
-        let start = panel_start(width, first);
-        for row in first * PANEL..width {
-            for column in 0..width {
-                let value = f64::from(u8::from(row == column));
-                panels[start + column].0[row % PANEL] = T::from_f64(value);
-            }
+        let (last, mixed) = (panels.len() - width, start..start + width);
+        for panel in &mut panels[mixed.clone()] {
+            panel.0 = [T::ZERO; PANEL];
+        }
+        for panel in &mut panels[last..] {
+            panel.0 = [T::ZERO; PANEL];
+        }
+        for (row, panel) in panels[mixed].iter_mut().enumerate().skip(first * PANEL) {
+            panel.0[row % PANEL] = T::from_f64(1.0);
         }
         for tile in 0..shape.bottom_tile_count() {
             let begin = width + ROWS * tile;
@@ -92,7 +89,7 @@ fn panel_start(width: usize, panel: usize) -> usize {
     PANEL * growing * (growing + 1) / 2 + (panel - growing) * width
 }
 
-/// Copies the rows of a tile, which are `rows` of P.
+/// Copies the rows of a tile below the square, which are `rows` of P.
 #[inline(always)]
 fn copy_rows<T: Real>(
     columns: &[Column],
@@ -103,8 +100,7 @@ fn copy_rows<T: Real>(
     let (mut row, mut from) = (rows.start, 0);
     while row < rows.end {
         let count = (PANEL - row % PANEL).min(rows.end - row);
-        let start = panel_start(width, row / PANEL);
-        let panels = &mut panels[start..][..width.min(row / PANEL * PANEL + PANEL)];
+        let panels = &mut panels[panel_start(width, row / PANEL)..];
         for (panel, column) in panels.iter_mut().zip(columns) {
             let target = &mut panel.0[row % PANEL..][..count];
             for (target, &value) in target.iter_mut().zip(&column.rows()[from..][..count]) {
@@ -115,51 +111,55 @@ fn copy_rows<T: Real>(
     }
 }
 
-/// The inverse of a triangle from those of its diagonal blocks.
-#[inline(always)]
-fn invert<S: Simd>(
-    simd: S,
-    shape: Shape,
-    columns: &[Column],
-    inverses: &[Block],
-    inverse: &mut Vec<Column>,
-) {
-    let triangle = shape.top();
-    inverse.resize(triangle.column_count().max(inverse.len()), Column::ZERO);
-    for (tile, block) in inverses.iter().enumerate() {
-        let (above, rows) = inverse.split_at_mut(triangle.tile(tile).start);
-        let left = &columns[triangle.tile(tile)];
-        for column in (0..ROWS * tile).step_by(GROUP) {
-            let first = column / ROWS;
-            let right = (first..tile).map(|other| {
-                above[triangle.tile(other).start + column..].first_chunk().expect("four columns")
-            });
-            let left = &left[ROWS * first..ROWS * tile];
-            rows[column..][..GROUP].copy_from_slice(&negative_products(simd, block, left, &right));
-        }
-        let diagonal = &mut rows[ROWS * tile..triangle.tile(tile).len()];
-        diagonal.copy_from_slice(&block[..diagonal.len()]);
-    }
-}
-
 impl<T: Real> Finish<T> {
+    /// T⁻¹: what is done to the rows below the square is done to those of the identity.
     #[inline(always)]
-    fn take_right(&mut self, shape: Shape) {
-        let (triangle, width) = (shape.top(), shape.width);
-        self.right.clear();
-        for first in (0..width).step_by(COLUMNS) {
-            let count = COLUMNS.min(width - first);
-            for tile in first / ROWS..triangle.tile_count() {
-                let columns = &self.inverse[triangle.tile(tile)][first..first + count];
-                let rows = first.max(ROWS * tile)..width.min(ROWS * (tile + 1));
-                for row in rows {
-                    let mut entries = [T::ZERO; COLUMNS];
-                    for (entry, column) in entries.iter_mut().zip(columns) {
-                        *entry = T::from_f64(column.rows()[row % ROWS]);
-                    }
-                    self.right.push(entries);
+    fn invert<S: Simd>(&mut self, simd: S, shape: Shape, columns: &[Column], inverses: &[Block]) {
+        let (triangle, width) = (shape.top(), shape.bottom_width());
+        let size = triangle.tile_count() * width;
+        self.inverse.resize(size.max(self.inverse.len()), Column::ZERO);
+        for (tile, rows) in self.inverse[..size].chunks_exact_mut(width).enumerate() {
+            let rows = &mut rows[ROWS * tile..];
+            rows.fill(Column::ZERO);
+            for (k, column) in rows.iter_mut().take(ROWS).enumerate() {
+                for (value, from) in column.rows_mut()[..=k].iter_mut().zip(&inverses[tile]) {
+                    *value = from.rows()[k];
                 }
             }
+            for other in tile + 1..triangle.tile_count() {
+                let above = &columns[triangle.tile(other)][ROWS * tile..];
+                solve(simd, rows, above, &inverses[other], other - tile);
+            }
+        }
+    }
+
+    /// Copies the first rows of T⁻¹, with zeros above its diagonal.
+    #[inline(always)]
+    fn copy_inverse(&self, shape: Shape, rows: usize, panels: &mut [Panel<T>]) {
+        let mut panels = panels.iter_mut();
+        for first in (0..rows).step_by(PANEL) {
+            for (column, panel) in (0..shape.width.min(first + PANEL)).zip(&mut panels) {
+                let inverse = &self.inverse[column / ROWS * shape.bottom_width()..];
+                panel.0 = [T::ZERO; PANEL];
+                let begin = first.max(column);
+                let values = &inverse[begin..rows.min(first + PANEL)];
+                for (entry, values) in panel.0[begin - first..].iter_mut().zip(values) {
+                    *entry = T::from_f64(values.rows()[column % ROWS]);
+                }
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn take_right(&mut self, shape: Shape) {
+        self.right.clear();
+        for first in (0..shape.width).step_by(COLUMNS) {
+            let tile = &self.inverse[first / ROWS * shape.bottom_width()..];
+            let rows = tile[first..shape.width].iter().map(|column| {
+                let values = column.rows()[first % ROWS..].first_chunk::<COLUMNS>();
+                values.expect("columns of one tile").map(T::from_f64)
+            });
+            self.right.extend(rows);
         }
     }
 }

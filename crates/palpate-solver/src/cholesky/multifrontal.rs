@@ -8,7 +8,7 @@
 
 use std::sync::Arc;
 
-use super::assembly::Assembly;
+use super::assembly::{Assembly, Part};
 use super::changes::{Contribution, Plan};
 use super::elimination::eliminate;
 use super::finish::Finish;
@@ -116,23 +116,28 @@ impl Fronts {
         // Memory beyond a front is kept.
         let count = shape.column_count();
         self.columns.resize(count.max(self.columns.len()), Column::ZERO);
-        let mut front = Front { shape, columns: &mut self.columns[..count], contribution };
-        self.assembly.begin(supernodes, matrix, s, &mut front);
+        let columns = &mut self.columns[..count];
+        self.assembly.begin(supernodes, matrix, s, shape, columns);
         let size = |child: usize| self::shape(supernodes, child).contribution().column_count();
         let children = supernodes.children(s).iter().map(|&child| child as usize);
         let on_stack = children.clone().filter(|&child| plan.contributions[child].is_none());
-        let mut waiting = others.pop(on_stack.map(size).sum());
-        for child in children {
-            let contribution = if let Some(kept) = &plan.contributions[child] {
-                kept
-            } else {
-                let (contribution, rest) = waiting.split_at(size(child));
-                waiting = rest;
-                contribution
-            };
-            self.assembly.add(supernodes, child, contribution, &mut front);
-        }
-        eliminate(front, &mut self.inverses)?;
+        let waiting = others.pop(on_stack.map(size).sum());
+        let mut add = |part: Part, target: &mut [Column]| {
+            let mut waiting = waiting;
+            for child in children.clone() {
+                let left = if let Some(kept) = &plan.contributions[child] {
+                    kept
+                } else {
+                    let (left, rest) = waiting.split_at(size(child));
+                    waiting = rest;
+                    left
+                };
+                self.assembly.add(supernodes.rows(child), left, shape, part, target);
+            }
+        };
+        add(Part::Columns, columns);
+        eliminate(Front { shape, columns, contribution }, &mut self.inverses)?;
+        add(Part::Contribution, contribution);
         Ok(kept.map(Arc::new))
     }
 }

@@ -63,25 +63,27 @@ impl Triangle {
 /// Sums of a product: vectors of some columns.
 type Sums<S> = [[<S as Simd>::f64s; VECTORS]; GROUP];
 
-/// Adds the products of columns of `left`, in the rows of one `part` of the tile, with numbers for each of
-/// the columns of the result.
+/// Products of columns of `left`, in the rows of one `part` of the tile, with rows `GROUP * group..` of
+/// the same columns of `right`.
 #[inline(always)]
-fn add_products<S: Simd>(
+fn products<S: Simd>(
     simd: S,
     left: &[Column],
-    right: impl Iterator<Item = [f64; GROUP]>,
+    right: &[Column],
+    group: usize,
     part: usize,
-    sums: &mut Sums<S>,
-) {
+) -> Sums<S> {
+    let mut sums = [[simd.splat_f64s(0.0); VECTORS]; GROUP];
     for (left, right) in left.iter().zip(right) {
         let left = &vectors::<S>(left)[part * VECTORS..][..VECTORS];
-        for (sums, factor) in sums.iter_mut().zip(right) {
+        for (sums, &factor) in sums.iter_mut().zip(&right.0[group]) {
             let factor = simd.splat_f64s(factor);
             for (sum, &value) in sums.iter_mut().zip(left) {
                 *sum = simd.mul_add_f64s(value, factor, *sum);
             }
         }
     }
+    sums
 }
 
 #[inline(always)]
@@ -110,13 +112,32 @@ pub(super) fn subtract_transposed<S: Simd>(
     target: &mut [Column],
 ) {
     for part in 0..parts::<S>() {
-        let mut sums = [[simd.splat_f64s(0.0); VECTORS]; GROUP];
-        let rows = right.iter().map(|column| column.0[group]);
-        add_products(simd, left, rows, part, &mut sums);
+        let sums = products(simd, left, right, group, part);
         for (target, sums) in target.iter_mut().zip(sums) {
             let target = &mut vectors_mut::<S>(target)[part * VECTORS..][..VECTORS];
             for (target, sum) in target.iter_mut().zip(sums) {
                 *target = simd.sub_f64s(*target, sum);
+            }
+        }
+    }
+}
+
+/// Writes to four columns the negative product of `left` with the transpose of rows `GROUP * group..` of
+/// `right`.
+#[inline(always)]
+pub(super) fn negative_transposed<S: Simd>(
+    simd: S,
+    left: &[Column],
+    right: &[Column],
+    group: usize,
+    target: &mut [Column],
+) {
+    for part in 0..parts::<S>() {
+        let sums = products(simd, left, right, group, part);
+        for (target, sums) in target.iter_mut().zip(sums) {
+            let target = &mut vectors_mut::<S>(target)[part * VECTORS..][..VECTORS];
+            for (target, sum) in target.iter_mut().zip(sums) {
+                *target = simd.neg_f64s(sum);
             }
         }
     }
@@ -129,51 +150,10 @@ pub(super) fn multiply_transposed<S: Simd>(simd: S, tile: &mut [Column], right: 
     for group in (0..tile.len() / GROUP).rev() {
         let tile = &mut tile[..GROUP * (group + 1)];
         for part in 0..parts::<S>() {
-            let mut sums = [[simd.splat_f64s(0.0); VECTORS]; GROUP];
-            let rows = right.iter().map(|column| column.0[group]);
-            add_products(simd, tile, rows, part, &mut sums);
+            let sums = products(simd, tile, right, group, part);
             for (target, sums) in tile[GROUP * group..].iter_mut().zip(sums) {
                 vectors_mut::<S>(target)[part * VECTORS..][..VECTORS].copy_from_slice(&sums);
             }
         }
     }
-}
-
-/// The rows of four columns.
-#[inline(always)]
-fn numbers(columns: &[Column; GROUP]) -> impl Iterator<Item = [f64; GROUP]> {
-    let [a, b, c, d] = columns.each_ref().map(Column::rows);
-    a.iter().zip(b).zip(c.iter().zip(d)).map(|((&a, &b), (&c, &d))| [a, b, c, d])
-}
-
-/// Four columns of `-inverse * (left * right)`, `right` being some whole tiles below each other.
-#[inline(always)]
-pub(super) fn negative_products<'a, S: Simd>(
-    simd: S,
-    inverse: &Block,
-    left: &[Column],
-    right: &(impl Iterator<Item = &'a [Column; GROUP]> + Clone),
-) -> [Column; GROUP] {
-    let mut product = [Column::ZERO; GROUP];
-    for part in 0..parts::<S>() {
-        let mut sums = [[simd.splat_f64s(0.0); VECTORS]; GROUP];
-        for (left, right) in left.chunks_exact(ROWS).zip(right.clone()) {
-            add_products(simd, left, numbers(right), part, &mut sums);
-        }
-        for (target, sums) in product.iter_mut().zip(sums) {
-            vectors_mut::<S>(target)[part * VECTORS..][..VECTORS].copy_from_slice(&sums);
-        }
-    }
-    let mut result = [Column::ZERO; GROUP];
-    for part in 0..parts::<S>() {
-        let mut sums = [[simd.splat_f64s(0.0); VECTORS]; GROUP];
-        add_products(simd, inverse, numbers(&product), part, &mut sums);
-        for (target, sums) in result.iter_mut().zip(sums) {
-            let target = &mut vectors_mut::<S>(target)[part * VECTORS..][..VECTORS];
-            for (target, sum) in target.iter_mut().zip(sums) {
-                *target = simd.neg_f64s(sum);
-            }
-        }
-    }
-    result
 }

@@ -10,7 +10,7 @@ use crate::cholesky::packed::{Panel, ROWS as PANEL};
 use crate::cholesky::real::Real;
 use crate::cholesky::tiles::{Block, Column};
 
-/// The lower triangle of a positive definite front, column after column.
+/// The columns of a positive definite front, column after column, and zeros.
 fn front(shape: Shape, seed: u64) -> Vec<f64> {
     let height = shape.width + shape.below;
     let mut state = seed | 1;
@@ -19,7 +19,7 @@ fn front(shape: Shape, seed: u64) -> Vec<f64> {
         (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
     };
     let mut entries = vec![0.0; height * height];
-    for column in 0..height {
+    for column in 0..shape.width {
         for row in column..height {
             entries[column * height + row] = draw();
         }
@@ -39,14 +39,16 @@ struct Tiled {
 
 impl Tiled {
     fn new(shape: Shape, entries: &[f64]) -> Self {
+        let mut nowhere = Column::ZERO;
+        nowhere.rows_mut().fill(f64::NAN);
         let mut result = Self {
             shape,
             columns: vec![Column::ZERO; shape.column_count()],
-            contribution: vec![Column::ZERO; shape.contribution().column_count()],
+            contribution: vec![nowhere; shape.contribution().column_count()],
             inverses: Vec::new(),
         };
         let height = shape.width + shape.below;
-        for (column, entries) in entries.chunks_exact(height).enumerate() {
+        for (column, entries) in entries.chunks_exact(height).enumerate().take(shape.width) {
             for (row, &entry) in entries.iter().enumerate().skip(column) {
                 *result.entry(row, column) = entry;
             }
