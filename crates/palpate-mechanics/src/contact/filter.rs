@@ -110,6 +110,15 @@ impl BodyView<'_> {
     }
 }
 
+/// What the filter asks about the step before.
+pub(crate) trait LastStep: Sync {
+    /// Whether a pair carried a force.
+    fn holds(&self, pair: &ProximityPair) -> bool;
+
+    /// Force on a node by the triangles of a body [N].
+    fn on_node(&self, bodies: [u32; 2], node: u32) -> DVec3;
+}
+
 /// Finds the contact candidates of a step. Keeps its memory.
 #[derive(Debug, Default)]
 pub(crate) struct Filter {
@@ -130,12 +139,12 @@ impl Filter {
     }
 
     /// Adds the contact candidates of this step, in the order of the pairs, then of the penetrations.
-    /// `is_loaded` tells which pairs carried a force in the last step.
+    /// `last` are the forces of the last step.
     pub(crate) fn run<'a>(
         &mut self,
         Detected { proximity, penetration }: Detected<'_>,
         view: impl Fn(u32) -> BodyView<'a> + Sync,
-        is_loaded: impl Fn(&ProximityPair) -> bool + Sync,
+        last: &impl LastStep,
         time_step: f64,
         pool: Option<&rayon::ThreadPool>,
         candidates: &mut Vec<Candidate>,
@@ -148,7 +157,7 @@ impl Filter {
         found.resize_with(count.max(found.len()), Vec::new);
         let test = |(pairs, found): (&[ProximityPair], &mut Vec<Candidate>)| {
             found.clear();
-            let candidate = |pair| self.test(pair, &view, &is_loaded, time_step);
+            let candidate = |pair| self.test(pair, &view, last, time_step);
             found.extend(pairs.iter().filter_map(candidate));
         };
         let found_by = &mut found[..count];
@@ -193,7 +202,7 @@ impl Filter {
         &self,
         pair: &ProximityPair,
         view: impl Fn(u32) -> BodyView<'a>,
-        is_loaded: impl Fn(&ProximityPair) -> bool,
+        last: &impl LastStep,
         time_step: f64,
     ) -> Option<Candidate> {
         let bodies = pair.bodies.map(view);
@@ -201,8 +210,8 @@ impl Filter {
             return None;
         }
         let Meeting { gap, normal, offset } = match pair.kind {
-            PairKind::VertexTriangle => self.vertex_triangle(pair, bodies),
-            PairKind::EdgeEdge => edge_edge(pair, bodies, is_loaded(pair)),
+            PairKind::VertexTriangle => self.vertex_triangle(pair, bodies, last),
+            PairKind::EdgeEdge => edge_edge(pair, bodies, last.holds(pair)),
         }?;
         let area = match pair.kind {
             PairKind::VertexTriangle => bodies[0].surface.node_area(pair.nodes[0]),
@@ -259,6 +268,7 @@ impl Filter {
         &self,
         pair: &ProximityPair,
         [own, other]: [BodyView<'_>; 2],
+        last: &impl LastStep,
     ) -> Option<Meeting> {
         let key = (pair.bodies[0], pair.nodes[0], pair.bodies[1]);
         if self.inside.binary_search(&key).is_ok() {
@@ -316,6 +326,10 @@ impl Filter {
         }
         if behind {
             return None;
+        }
+        if !other.surface.is_closed() && last.on_node(pair.bodies, node).dot(normal) < 0.0 {
+            // Through an open surface that pushed it the other way before.
+            return Some(Meeting { gap: -gap, normal: -normal, offset: 0.0 });
         }
         let faces_away = own.surface.is_closed()
             && own.surface.node_normal(node, own.positions).dot(normal) > FACING_LIMIT;
@@ -461,6 +475,18 @@ mod tests {
         Body::new("roof", Arc::new(Mesh::new(data).unwrap()))
     }
 
+    struct Loaded(bool);
+
+    impl LastStep for Loaded {
+        fn holds(&self, _: &ProximityPair) -> bool {
+            self.0
+        }
+
+        fn on_node(&self, _: [u32; 2], _: u32) -> DVec3 {
+            DVec3::ZERO
+        }
+    }
+
     /// Whether two roofs with a slope of `slope` touch with their edges, crosswise.
     fn edges_touch(slope: f64, is_loaded: bool) -> bool {
         let below =
@@ -496,7 +522,7 @@ mod tests {
         Filter::default().run(
             Detected { proximity: &[pair], penetration: &[] },
             view,
-            |_| is_loaded,
+            &Loaded(is_loaded),
             0.01,
             None,
             &mut candidates,

@@ -1,7 +1,7 @@
 //! The contact stage of a step: candidates, forces, and the contacts that are reported.
 
 use glam::DVec3;
-use palpate_contact::{PairKind, ProximityPair};
+use palpate_contact::PairKind;
 
 use super::Contact;
 use super::filter::{BodyView, Candidate, Detected, Filter};
@@ -66,8 +66,7 @@ impl Response {
     ) {
         let view = |body: u32| view(body as usize);
         let (last, candidates) = (&self.last, &mut self.candidates);
-        let is_loaded = |pair: &ProximityPair| last.holds(pair);
-        self.filter.run(detected, view, is_loaded, time_step, pool, candidates);
+        self.filter.run(detected, view, last, time_step, pool, candidates);
         self.spare.clear();
         let spare = &mut self.spare;
         self.candidates.retain(|candidate| {
