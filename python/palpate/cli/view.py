@@ -88,7 +88,13 @@ def command(
         if is_mesh(target):  # nothing is there that it could fall on
             model = Model(model.bodies, gravity=(0.0, 0.0, 0.0))
         return LivePlayer(
-            Simulation(model, time_step=time_step, threads=threads, leaf_size=leaf_size)
+            Simulation(
+                model,
+                time_step=time_step,
+                threads=threads,
+                leaf_size=leaf_size,
+                substeps="auto",
+            )
         )
 
     if export is not None:

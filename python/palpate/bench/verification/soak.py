@@ -11,7 +11,6 @@ import gc
 import os
 import sys
 import time
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -33,6 +32,8 @@ TOO_DEEP, TOO_FAST = 5.0, 30.0
 EPISODES, CUTS = 40, 4
 #: Where the probe waits, above everything [m].
 HOME = np.array([0.0, 0.0, 0.5])
+#: How far the probe moves in a step among the organs, in edges; force at which a hand yields [N].
+SPEED, HARDEST = 0.5, 10.0
 #: Growth that counts: of memory between rounds, and of the median time of a step.
 MORE_MEMORY, MORE_TIME = 1.1, 1.5
 
@@ -81,11 +82,12 @@ class Soak:
         tool = Body(ball.with_nodes(ball.nodes + HOME), name="probe", rigid=())
         bodies = [*model.bodies, tool]
         self._simulation = Simulation(
-            Model(bodies, gravity=model.gravity, attachments=model.attachments)
+            Model(bodies, gravity=model.gravity, attachments=model.attachments), substeps="auto"
         )
         self._tool = self._simulation.tool("probe")
         self.faults: list[str] = []
         self.steps = 0
+        self._smaller = 0
         self._deepest = 0.0
         self._deep_since = 0
         self._cuts = 0
@@ -93,14 +95,17 @@ class Soak:
         #: Of each round: median time of a step [s] and memory at its end [MB].
         self.rounds: list[tuple[float, float]] = []
 
-    def _step(self, count: int, before: Callable[[int], None] | None = None) -> None:
-        for index in range(count):
-            if before is not None:
-                before(index)
+    def _fault(self, what: str) -> None:
+        self.faults.append(f"step {self.steps}: {what}")
+        print(self.faults[-1], flush=True)
+
+    def _step(self, count: int = 1) -> None:
+        for _ in range(count):
             start = time.process_time()
             report = self._simulation.step()
             self._seconds.append(time.process_time() - start)
             self.steps += 1
+            self._smaller += report.substeps > 1
             depth = report.max_depth / self._edge
             self._deepest = max(self._deepest, depth)
             self._deep_since = self._deep_since + 1 if depth > DEEP else 0
@@ -112,25 +117,25 @@ class Soak:
                 if body.rigid is None
             )
             if depth > TOO_DEEP or fastest > TOO_FAST:
-                fault = f"{depth:.1f} edges deep, {fastest:.0f} m/s"
-                self.faults.append(f"step {self.steps}: {fault}")
+                self._fault(f"{depth:.1f} edges deep, {fastest:.0f} m/s")
             if self._deep_since == LASTING:
-                self.faults.append(f"step {self.steps}: a node is stuck {depth:.2f} edges deep")
+                self._fault(f"a node is stuck {depth:.2f} edges deep")
             if self.steps % 500 == 0:
                 self._tell(depth)
 
     def _tell(self, depth: float) -> None:
         places = self._simulation.positions
         if not all(np.isfinite(x).all() for x in places):
-            self.faults.append(f"step {self.steps}: a position is not finite")
+            self._fault("a position is not finite")
         inverted = sum(
             int((signed_volumes(x, body.mesh.tetrahedra) <= 0).sum())
             for x, body in zip(places, self._simulation.model.bodies, strict=True)
             if body.rigid is None
         )
         print(
-            f"{self.steps} steps, {self._cuts} cuts: deepest {self._deepest:.2f} edges, now "
-            f"{depth:.3f}, {inverted} inverted, {len(self._simulation.intersections())} pairs, "
+            f"{self.steps} steps ({self._smaller} in smaller ones), {self._cuts} cuts: "
+            f"deepest {self._deepest:.2f} edges, now {depth:.3f}, {inverted} inverted, "
+            f"{len(self._simulation.intersections())} pairs, "
             f"{1e3 * float(np.median(self._seconds[-500:])):.1f} ms, {memory():.0f} MB",
             flush=True,
         )
@@ -158,16 +163,26 @@ class Soak:
             pull.release()
 
     def _push(self) -> None:
-        """The probe comes from outside towards a node, goes some edges deep, and leaves."""
+        """The probe comes from above towards a node, goes some edges deep, yields, and leaves."""
         name, node = self._node()
         goal = self._simulation.positions[self._index(name)][node]
         way = self._direction()
-        way[2] = abs(way[2])  # from above
+        way[2] = abs(way[2])
         outside, inside = goal + 0.08 * way, goal - 2.0 * self._edge * way
-        above = np.array([*outside[:2], HOME[2]])
-        path = [(HOME, above, 1), (above, outside, 20), (outside, inside, 30)]
-        for start, end, count in [*path, *((b, a, n) for a, b, n in reversed(path))]:
-            self._step(count, lambda k: self._place(start + (end - start) * (k + 1) / count))  # noqa: B023
+        above = np.array([*outside[:2], max(0.25, outside[2])])
+        path = [above]
+        for start, end in ((above, outside), (outside, inside)):
+            count = 1 + int(np.linalg.norm(end - start) / (SPEED * self._edge))
+            path += [start + (end - start) * k / count for k in range(1, count + 1)]
+        reached = 0
+        for reached, point in enumerate(path):  # noqa: B007
+            self._place(point)
+            self._step()
+            if float(np.linalg.norm(self._tool.force)) > HARDEST:
+                break
+        for point in [*reversed(path[:reached]), HOME]:
+            self._place(point)
+            self._step()
 
     def _place(self, point: Float64Array) -> None:
         self._tool.set_pose([1.0, 0.0, 0.0, 0.0], point - HOME)
@@ -199,7 +214,7 @@ class Soak:
                     self._cut()
                 self._step(30)
             except SimulationError as error:
-                self.faults.append(f"step {self.steps}: {error}")
+                self._fault(str(error))
                 break
         median = float(np.median(self._seconds)) if self._seconds else 0.0
         self._deep_since = 0
