@@ -11,7 +11,7 @@ use std::sync::Arc;
 use super::packed::{PackedFactor, Panel};
 use super::supernodes::Supernodes;
 use super::tiles::Column;
-use crate::BlockMatrix;
+use crate::block_matrix::{Block, BlockMatrix};
 use crate::ordering::NONE;
 
 #[cfg(test)]
@@ -96,16 +96,29 @@ impl Older<'_> {
         s: usize,
         before: &[u32],
     ) -> bool {
+        let (old_blocks, blocks) = (self.kept.matrix.blocks(), matrix.blocks());
         self.supernodes.nodes(twin).zip(supernodes.nodes(s)).all(|(old, new)| {
-            let old = self.supernodes.column(&self.kept.matrix, old);
-            let new = supernodes.column(matrix, new);
-            let bits = |block: [[f64; 3]; 3]| block.map(|column| column.map(f64::to_bits));
+            let (old, new) = (self.supernodes.entries(old), supernodes.entries(new));
             old.len() == new.len()
-                && old.zip(new).all(|((old_row, old), (row, new))| {
-                    old_row == before[row as usize] && bits(old) == bits(new)
-                })
+                && old.iter().zip(new).all(
+                    |(&(old_row, old, was_turned), &(row, new, is_turned))| {
+                        let (old, new) = (&old_blocks[old as usize], &blocks[new as usize]);
+                        old_row == before[row as usize]
+                            && if was_turned == is_turned {
+                                has_same_bits(old, new)
+                            } else {
+                                let turned = |i: usize| std::array::from_fn(|k| new[k][i]);
+                                has_same_bits(old, &std::array::from_fn(turned))
+                            }
+                    },
+                )
         })
     }
+}
+
+fn has_same_bits(a: &Block, b: &Block) -> bool {
+    let pairs = a.as_flattened().iter().zip(b.as_flattened());
+    pairs.fold(0, |difference, (a, b)| difference | (a.to_bits() ^ b.to_bits())) == 0
 }
 
 /// What a factorisation takes over and what it keeps, by supernode.

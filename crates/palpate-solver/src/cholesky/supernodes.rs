@@ -69,27 +69,24 @@ impl Supernodes {
     /// Sorts the blocks of the pattern by their column in the order.
     fn take_blocks(&mut self, pattern: &BlockPattern, places: &[u32]) {
         let count = pattern.node_count();
-        let blocks = || {
-            (0..count).flat_map(move |col| {
-                let entries = pattern.range(col).zip(pattern.column(col));
-                entries.map(move |(index, &row)| {
-                    let (p, q) = (places[row as usize], places[col]);
-                    (p.min(q), (p.max(q), index as u32, p < q))
-                })
-            })
-        };
         self.block_starts = vec![0; count + 1];
-        for (col, _) in blocks() {
-            self.block_starts[col as usize + 1] += 1;
+        for col in 0..count {
+            for &row in pattern.column(col) {
+                self.block_starts[places[row as usize].min(places[col]) as usize + 1] += 1;
+            }
         }
         for col in 0..count {
             self.block_starts[col + 1] += self.block_starts[col];
         }
         let mut next = self.block_starts.clone();
         self.blocks = vec![(0, 0, false); pattern.block_count()];
-        for (col, block) in blocks() {
-            self.blocks[next[col as usize] as usize] = block;
-            next[col as usize] += 1;
+        for col in 0..count {
+            for (index, &row) in pattern.range(col).zip(pattern.column(col)) {
+                let (p, q) = (places[row as usize], places[col]);
+                let place = &mut next[p.min(q) as usize];
+                self.blocks[*place as usize] = (p.max(q), index as u32, p < q);
+                *place += 1;
+            }
         }
         for range in self.block_starts.windows(2) {
             self.blocks[range[0] as usize..range[1] as usize].sort_unstable();
@@ -201,13 +198,18 @@ impl Supernodes {
         &'a self,
         matrix: &'a BlockMatrix,
         node: usize,
-    ) -> impl ExactSizeIterator<Item = (u32, [[f64; 3]; 3])> + 'a {
-        let range = self.block_starts[node] as usize..self.block_starts[node + 1] as usize;
-        self.blocks[range].iter().map(|&(row, index, transposed)| {
+    ) -> impl Iterator<Item = (u32, [[f64; 3]; 3])> + 'a {
+        self.entries(node).iter().map(|&(row, index, transposed)| {
             let block = &matrix.blocks()[index as usize];
             let entry = |i: usize, k: usize| if transposed { block[k][i] } else { block[i][k] };
             (row, std::array::from_fn(|k| std::array::from_fn(|i| entry(i, k))))
         })
+    }
+
+    /// Where the blocks of a column are in a matrix of the pattern: row, stored block, whether it is used
+    /// transposed; rows ascending.
+    pub(super) fn entries(&self, node: usize) -> &[(u32, u32, bool)] {
+        &self.blocks[self.block_starts[node] as usize..self.block_starts[node + 1] as usize]
     }
 }
 
