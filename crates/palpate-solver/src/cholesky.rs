@@ -350,7 +350,8 @@ impl Cholesky {
         if let Some((change, packed)) = known
             && let Some(kept) = &change.older.kept
         {
-            return Plan::changing(&self.supernodes, &change.twins, packed, &kept.contributions);
+            let older = Older { supernodes: &change.older.supernodes, kept };
+            return Plan::changing(&self.supernodes, &change.twins, &older, packed);
         }
         if keeps { Plan::keeping(&self.supernodes) } else { Plan::whole(&self.supernodes) }
     }
@@ -521,10 +522,7 @@ impl Cholesky {
                 Packed::Single(packed) => packed.bytes(),
                 Packed::Double(packed) => packed.bytes(),
             },
-            supernodes: match &self.packed {
-                Packed::Single(packed) => packed.supernode_count(),
-                Packed::Double(packed) => packed.supernode_count(),
-            },
+            supernodes: self.supernodes.count(),
             computed: self.computed,
             kept_bytes: self.kept.as_ref().map_or(0, Kept::bytes),
         }

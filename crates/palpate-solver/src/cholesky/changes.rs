@@ -8,7 +8,7 @@
 
 use std::sync::Arc;
 
-use super::packed::{PackedFactor, Panel};
+use super::packed::{PackedFactor, Supernode};
 use super::supernodes::Supernodes;
 use super::tiles::Column;
 use crate::block_matrix::{Block, BlockMatrix};
@@ -123,8 +123,8 @@ fn has_same_bits(a: &Block, b: &Block) -> bool {
 
 /// What a factorisation takes over and what it keeps, by supernode.
 pub(super) struct Plan<'a, T> {
-    /// Columns that are known.
-    pub(super) known: Vec<Option<&'a Arc<Vec<Panel<T>>>>>,
+    /// Its pieces, if they are known.
+    pub(super) known: Vec<Option<&'a [Supernode<T>]>>,
     pub(super) is_computed: Vec<bool>,
     pub(super) is_kept: Vec<bool>,
     /// Known to begin with, and those that are kept.
@@ -152,13 +152,13 @@ impl<'a, T> Plan<'a, T> {
     pub(super) fn changing(
         supernodes: &Supernodes,
         twins: &[u32],
+        older: &Older,
         factor: &'a PackedFactor<T>,
-        contributions: &[Option<Contribution>],
     ) -> Self {
         let mut plan = Self::keeping(supernodes);
         for (s, &twin) in twins.iter().enumerate().filter(|&(_, &twin)| twin != NONE) {
-            plan.known[s] = Some(&factor.supernodes[twin as usize].panels);
-            plan.contributions[s].clone_from(&contributions[twin as usize]);
+            plan.known[s] = Some(&factor.supernodes[older.supernodes.pieces(twin as usize)]);
+            plan.contributions[s].clone_from(&older.kept.contributions[twin as usize]);
         }
         for s in (0..supernodes.count()).rev() {
             let is_needed = supernodes.parent(s).is_some_and(|parent| plan.is_computed[parent]);

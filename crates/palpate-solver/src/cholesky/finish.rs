@@ -1,7 +1,9 @@
-//! What a solve needs of the columns of a front that are eliminated: P = [T⁻¹; B T⁻¹] for the factor T of
-//! their square and the rows B below it, in panels.
+//! What a solve needs of a piece of the columns of a front that are eliminated: P = [T⁻¹; B T⁻¹] for the
+//! factor T of their square and the rows B below it, in panels.
 
 #![allow(clippy::inline_always)] // compiled for the vector unit of the caller
+
+use std::ops::Range;
 
 use pulp::{Simd, WithSimd};
 
@@ -15,6 +17,21 @@ use super::tiles::{Block, Column, ROWS};
 const COLUMNS: usize = 6;
 const VECTORS: usize = 2;
 
+/// Some of the columns of a front that are solved together, from a tile's first one on.
+#[derive(Clone, Copy)]
+pub(super) struct Piece {
+    first: usize,
+    /// Of these columns from their square on.
+    pub(super) shape: Shape,
+}
+
+impl Piece {
+    pub(super) fn new(front: Shape, first: usize, width: usize) -> Self {
+        let below = front.width + front.below - first - width;
+        Self { first, shape: Shape { width, below } }
+    }
+}
+
 /// Memory for finishing.
 #[derive(Default)]
 pub(super) struct Finish<T> {
@@ -25,20 +42,22 @@ pub(super) struct Finish<T> {
 }
 
 impl<T: Real> Finish<T> {
-    /// Fills the panels of a front that has been eliminated.
+    /// Fills the panels of a piece of a front that has been eliminated.
     pub(super) fn finish(
         &mut self,
-        shape: Shape,
+        front: Shape,
+        piece: Piece,
         columns: &[Column],
         inverses: &[Block],
         panels: &mut [Panel<T>],
     ) {
-        pulp::Arch::new().dispatch(Task { shape, columns, inverses, panels, memory: self });
+        pulp::Arch::new().dispatch(Task { front, piece, columns, inverses, panels, memory: self });
     }
 }
 
 pub(super) struct Task<'a, T> {
-    pub(super) shape: Shape,
+    pub(super) front: Shape,
+    pub(super) piece: Piece,
     pub(super) columns: &'a [Column],
     pub(super) inverses: &'a [Block],
     pub(super) panels: &'a mut [Panel<T>],
@@ -50,9 +69,10 @@ impl<T: Real> WithSimd for Task<'_, T> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let Self { shape, columns, inverses, panels, memory } = self;
+        let Self { front, piece, columns, inverses, panels, memory } = self;
+        let Piece { first: begin, shape } = piece;
         let (width, first) = (shape.width, shape.width / PANEL);
-        memory.invert(simd, shape, columns, inverses);
+        memory.invert(simd, front, piece, columns, inverses);
         // The rows of the square in the first panel with others are those of the identity times T⁻¹.
         let start = panel_start(width, first);
         let whole = if shape.below == 0 { width } else { first * PANEL };
@@ -70,10 +90,18 @@ impl<T: Real> WithSimd for Task<'_, T> {
         for (row, panel) in panels[mixed].iter_mut().enumerate().skip(first * PANEL) {
             panel.0[row % PANEL] = T::from_f64(1.0);
         }
-        for tile in 0..shape.bottom_tile_count() {
-            let begin = width + ROWS * tile;
-            let rows = begin..(begin + ROWS).min(width + shape.below);
-            copy_rows(&columns[shape.bottom_tile(tile)][..width], rows, width, panels);
+        let mut row = width;
+        let mut copy = |tile: Range<usize>, count: usize| {
+            let columns = &columns[tile][begin..begin + width];
+            copy_rows(columns, row..row + count, width, panels);
+            row += count;
+        };
+        let triangle = front.top();
+        for tile in (begin + width).div_ceil(ROWS)..triangle.tile_count() {
+            copy(triangle.tile(tile), ROWS.min(front.width - ROWS * tile));
+        }
+        for tile in 0..front.bottom_tile_count() {
+            copy(front.bottom_tile(tile), ROWS.min(front.below - ROWS * tile));
         }
         memory.take_right(shape);
         for panel in panels[start..].chunks_exact_mut(width) {
@@ -93,7 +121,7 @@ fn panel_start(width: usize, panel: usize) -> usize {
 #[inline(always)]
 fn copy_rows<T: Real>(
     columns: &[Column],
-    rows: std::ops::Range<usize>,
+    rows: Range<usize>,
     width: usize,
     panels: &mut [Panel<T>],
 ) {
@@ -114,19 +142,27 @@ fn copy_rows<T: Real>(
 impl<T: Real> Finish<T> {
     /// T⁻¹: what is done to the rows below the square is done to those of the identity.
     #[inline(always)]
-    fn invert<S: Simd>(&mut self, simd: S, shape: Shape, columns: &[Column], inverses: &[Block]) {
-        let (triangle, width) = (shape.top(), shape.bottom_width());
-        let size = triangle.tile_count() * width;
+    fn invert<S: Simd>(
+        &mut self,
+        simd: S,
+        front: Shape,
+        piece: Piece,
+        columns: &[Column],
+        inverses: &[Block],
+    ) {
+        let (triangle, width) = (front.top(), piece.shape.bottom_width());
+        let tiles = piece.first / ROWS..(piece.first + piece.shape.width).div_ceil(ROWS);
+        let size = tiles.len() * width;
         self.inverse.resize(size.max(self.inverse.len()), Column::ZERO);
-        for (tile, rows) in self.inverse[..size].chunks_exact_mut(width).enumerate() {
-            let rows = &mut rows[ROWS * tile..];
+        for (tile, rows) in tiles.clone().zip(self.inverse.chunks_exact_mut(width)) {
+            let rows = &mut rows[ROWS * tile - piece.first..];
             rows.fill(Column::ZERO);
             for (k, column) in rows.iter_mut().take(ROWS).enumerate() {
                 for (value, from) in column.rows_mut()[..=k].iter_mut().zip(&inverses[tile]) {
                     *value = from.rows()[k];
                 }
             }
-            for other in tile + 1..triangle.tile_count() {
+            for other in tile + 1..tiles.end {
                 let above = &columns[triangle.tile(other)][ROWS * tile..];
                 solve(simd, rows, above, &inverses[other], other - tile);
             }

@@ -93,27 +93,35 @@ where
     }
 }
 
-/// Where the parts of half solutions stand: the tree of supernodes.
+/// Where the parts of half solutions stand: the tree of the pieces of supernodes.
 #[derive(Debug, Default)]
 pub(super) struct Paths {
     parents: Vec<u32>,
-    /// Begin and end of each supernode's part.
+    /// Begin and end of each piece's part.
     parts: Vec<(u32, u32)>,
-    /// Supernode of each node, in the order of elimination.
+    /// Piece of each node, in the order of elimination.
     of_node: Vec<u32>,
 }
 
 impl Paths {
     pub(super) fn new(supernodes: &Supernodes, node_count: usize) -> Self {
-        let count = supernodes.count();
-        let parents = (0..count).map(|s| supernodes.parent(s).map_or(NONE, |p| p as u32)).collect();
-        let mut parts = vec![(0, 0); count];
-        for s in (0..count).rev() {
-            let begin = supernodes.parent(s).map_or(0, |parent| parts[parent].1);
-            let width = (3 * supernodes.nodes(s).len()).next_multiple_of(LANES);
-            parts[s] = (begin, begin + width as u32);
+        let of_node: Vec<u32> =
+            (0..node_count).map(|node| supernodes.piece_of_node(node) as u32).collect();
+        let (mut parents, mut widths) = (Vec::new(), Vec::new());
+        for s in 0..supernodes.count() {
+            let end = supernodes.nodes(s).end;
+            for nodes in supernodes.piece_nodes(s) {
+                let below = supernodes.rows(s).first().map(|&row| row as usize);
+                let above = if nodes.end < end { Some(nodes.end) } else { below };
+                parents.push(above.map_or(NONE, |node| of_node[node]));
+                widths.push((3 * nodes.len()).next_multiple_of(LANES) as u32);
+            }
         }
-        let of_node = (0..node_count).map(|node| supernodes.of_node(node) as u32).collect();
+        let mut parts: Vec<(u32, u32)> = vec![(0, 0); parents.len()];
+        for (piece, &parent) in parents.iter().enumerate().rev() {
+            let begin = if parent == NONE { 0 } else { parts[parent as usize].1 };
+            parts[piece] = (begin, begin + widths[piece]);
+        }
         Self { parents, parts, of_node }
     }
 

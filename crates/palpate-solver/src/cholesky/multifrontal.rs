@@ -11,7 +11,7 @@ use std::sync::Arc;
 use super::assembly::{Assembly, Part};
 use super::changes::{Contribution, Plan};
 use super::elimination::eliminate;
-use super::finish::Finish;
+use super::finish::{Finish, Piece};
 use super::front::{Front, Shape};
 use super::memory::Spare;
 use super::packed::{PackedFactor, Panel};
@@ -82,15 +82,22 @@ impl Fronts {
                     .eliminate(supernodes, matrix, s, plan, kept)
                     .map_err(|column| first + column)?;
             }
-            let panels = if let Some(panels) = plan.known[s] {
-                Arc::clone(panels)
-            } else {
-                let mut panels = spare.take(shape.panel_count(), Panel::ZERO);
-                finish.finish(shape, &self.columns, &self.inverses, &mut panels);
-                Arc::new(panels)
-            };
-            let rows = supernodes.rows(s).iter().flat_map(|&row| [0, 1, 2].map(|k| 3 * row + k));
-            factor.push(first as u32, shape.width, rows, panels);
+            let mut begin = 0;
+            for (index, nodes) in supernodes.piece_nodes(s).enumerate() {
+                let piece = Piece::new(shape, begin, 3 * nodes.len());
+                begin += piece.shape.width;
+                let panels = if let Some(pieces) = plan.known[s] {
+                    Arc::clone(&pieces[index].panels)
+                } else {
+                    let mut panels = spare.take(piece.shape.panel_count(), Panel::ZERO);
+                    finish.finish(shape, piece, &self.columns, &self.inverses, &mut panels);
+                    Arc::new(panels)
+                };
+                let own = nodes.end as u32..supernodes.nodes(s).end as u32;
+                let rows = own.chain(supernodes.rows(s).iter().copied());
+                let rows = rows.flat_map(|row| [0, 1, 2].map(|k| 3 * row + k));
+                factor.push(3 * nodes.start as u32, piece.shape.width, rows, panels);
+            }
         }
         Ok(factor)
     }

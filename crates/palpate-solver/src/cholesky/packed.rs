@@ -1,6 +1,6 @@
 //! The factor packed for solving.
 //!
-//! Each supernode stores P = [T^-1; B T^-1] for its diagonal block T and the block B below it, so
+//! Each piece of a supernode, called a supernode here, stores P = [T^-1; B T^-1] for its diagonal block T and the block B below it, so
 //! that both passes of a solve are one dense product per supernode:
 //!
 //! forward, ascending: `u = P x_top`, `x_top = u_top`, `x[pattern] -= u_below`;
@@ -110,10 +110,6 @@ impl<T: Real> PackedFactor<T> {
     pub(super) fn bytes(&self) -> usize {
         let panels = self.supernodes.iter().map(|supernode| size_of_val(&**supernode.panels));
         panels.sum::<usize>() + size_of_val(&*self.pattern) + size_of_val(&*self.supernodes)
-    }
-
-    pub(super) fn supernode_count(&self) -> usize {
-        self.supernodes.len()
     }
 
     /// Makes the memory large enough; it is so after the first time.

@@ -7,11 +7,17 @@ use crate::{BlockMatrix, BlockPattern};
 /// Merge supernodes of up to so many columns while so small a part of the merged one is zero.
 const RELAXATION: [(u64, f64); 4] = [(12, 1.0), (32, 0.5), (64, 0.2), (u64::MAX, 0.05)];
 
+/// Nodes of a piece: whole tiles of a front.
+const PIECE: usize = 32;
+
 /// The supernodes of a pattern in an order, children before parents; nodes by their place in the order.
 #[derive(Debug, Default)]
 pub(super) struct Supernodes {
     /// First node of each, and the number of nodes.
     begins: Vec<u32>,
+    /// First piece of each, and the number of pieces: a supernode is eliminated as a whole, but wide ones
+    /// are solved in pieces, as the inverse of a triangle costs the cube of its width.
+    piece_starts: Vec<u32>,
     /// Where the rows of each begin.
     row_starts: Vec<u32>,
     /// Nodes below the diagonal block that its columns have entries in, ascending.
@@ -61,6 +67,12 @@ impl Run {
 impl Supernodes {
     pub(super) fn new(pattern: &BlockPattern, order: &NodeOrder, places: &[u32]) -> Self {
         let mut result = Self { begins: runs(order), ..Self::default() };
+        let mut pieces = 0;
+        result.piece_starts.push(0);
+        for s in 0..result.count() {
+            pieces += result.nodes(s).len().div_ceil(PIECE) as u32;
+            result.piece_starts.push(pieces);
+        }
         result.take_blocks(pattern, places);
         result.find_rows();
         result
@@ -157,6 +169,23 @@ impl Supernodes {
 
     pub(super) fn nodes(&self, s: usize) -> std::ops::Range<usize> {
         self.begins[s] as usize..self.begins[s + 1] as usize
+    }
+
+    /// Pieces of a supernode.
+    pub(super) fn pieces(&self, s: usize) -> std::ops::Range<usize> {
+        self.piece_starts[s] as usize..self.piece_starts[s + 1] as usize
+    }
+
+    /// Nodes of the pieces of a supernode.
+    pub(super) fn piece_nodes(&self, s: usize) -> impl Iterator<Item = std::ops::Range<usize>> {
+        let nodes = self.nodes(s);
+        nodes.clone().step_by(PIECE).map(move |first| first..nodes.end.min(first + PIECE))
+    }
+
+    /// The piece that a node is in.
+    pub(super) fn piece_of_node(&self, node: usize) -> usize {
+        let s = self.of_node(node);
+        self.pieces(s).start + (node - self.nodes(s).start) / PIECE
     }
 
     fn row_range(&self, s: usize) -> std::ops::Range<usize> {

@@ -1,14 +1,19 @@
 //! Fronts eliminated entry by entry, and on a vector unit without vectors.
 
+use std::ops::Range;
+
 use proptest::prelude::*;
 use pulp::WithSimd;
 
 use super::{Elimination, eliminate};
-use crate::cholesky::finish::{Finish, Task};
+use crate::cholesky::finish::{Finish, Piece, Task};
 use crate::cholesky::front::{Front, RowPlace, Shape};
 use crate::cholesky::packed::{Panel, ROWS as PANEL};
 use crate::cholesky::real::Real;
 use crate::cholesky::tiles::{Block, Column};
+
+/// Columns of a piece.
+const PIECE: usize = 72;
 
 /// The columns of a positive definite front, column after column, and zeros.
 fn front(shape: Shape, seed: u64) -> Vec<f64> {
@@ -78,8 +83,8 @@ impl Tiled {
     }
 }
 
-/// The factor's columns with what they leave, and the rows of X from X T = [1; B].
-fn eliminate_plainly(shape: Shape, mut entries: Vec<f64>) -> (Vec<f64>, Vec<f64>) {
+/// The factor's columns with what they leave.
+fn eliminate_plainly(shape: Shape, mut entries: Vec<f64>) -> Vec<f64> {
     let Shape { width, below } = shape;
     let height = width + below;
     for k in 0..width {
@@ -94,22 +99,28 @@ fn eliminate_plainly(shape: Shape, mut entries: Vec<f64>) -> (Vec<f64>, Vec<f64>
             }
         }
     }
-    let mut finished = vec![0.0; height * width];
-    for row in 0..height {
-        for col in (0..width).rev() {
-            let right = if row < width {
+    entries
+}
+
+/// The rows of X from X T = [1; B] for some columns.
+fn finish_plainly(height: usize, factor: &[f64], columns: Range<usize>) -> Vec<f64> {
+    let first = columns.start;
+    let mut finished = vec![0.0; (height - first) * columns.len()];
+    let entry = |row: usize, col: usize| (col - first) * (height - first) + row - first;
+    for row in first..height {
+        for col in columns.clone().rev() {
+            let right = if row < columns.end {
                 f64::from(u8::from(row == col))
             } else {
-                entries[col * height + row]
+                factor[col * height + row]
             };
-            let known: f64 = (col + 1..width)
-                .map(|k| finished[k * height + row] * entries[col * height + k])
+            let known: f64 = (col + 1..columns.end)
+                .map(|k| finished[entry(row, k)] * factor[col * height + k])
                 .sum();
-            finished[col * height + row] = (right - known) / entries[col * height + col];
+            finished[entry(row, col)] = (right - known) / factor[col * height + col];
         }
     }
-    let lower = (0..height).flat_map(|column| column * height + column..(column + 1) * height);
-    (lower.map(|entry| entries[entry]).collect(), finished)
+    finished
 }
 
 /// P of panels, column after column.
@@ -131,18 +142,24 @@ fn unpacked<T: Real>(shape: Shape, panels: &[Panel<T>]) -> Vec<f64> {
     result
 }
 
-fn check<T: Real>(tiled: &Tiled, exact: &[f64], tolerance: f64) {
-    let Tiled { shape, columns, inverses, .. } = tiled;
-    let panels = || vec![Panel([T::from_f64(f64::NAN); PANEL]); shape.panel_count()];
-    let (mut found, mut scalar) = (panels(), panels());
-    Finish::default().finish(*shape, columns, inverses, &mut found);
-    let (panels, memory) = (&mut scalar[..], &mut Finish::default());
-    Task { shape: *shape, columns, inverses, panels, memory }.with_simd(pulp::Scalar::new());
-    let (found, scalar) = (unpacked(*shape, &found), unpacked(*shape, &scalar));
-    for (found, exact) in found.iter().zip(exact) {
-        assert!((found - exact).abs() < tolerance, "{found} for {exact}");
+fn check<T: Real>(tiled: &Tiled, factor: &[f64], tolerance: f64) {
+    let Tiled { shape: front, columns, inverses, .. } = tiled;
+    let height = front.width + front.below;
+    for first in (0..front.width).step_by(PIECE) {
+        let end = front.width.min(first + PIECE);
+        let piece = Piece::new(*front, first, end - first);
+        let panels = || vec![Panel([T::from_f64(f64::NAN); PANEL]); piece.shape.panel_count()];
+        let (mut found, mut scalar) = (panels(), panels());
+        Finish::default().finish(*front, piece, columns, inverses, &mut found);
+        let (panels, memory) = (&mut scalar[..], &mut Finish::default());
+        let task = Task { front: *front, piece, columns, inverses, panels, memory };
+        task.with_simd(pulp::Scalar::new());
+        let (found, scalar) = (unpacked(piece.shape, &found), unpacked(piece.shape, &scalar));
+        for (found, exact) in found.iter().zip(finish_plainly(height, factor, first..end)) {
+            assert!((found - exact).abs() < tolerance, "{found} for {exact}");
+        }
+        assert!(found.iter().map(|x| x.to_bits()).eq(scalar.iter().map(|x| x.to_bits())));
     }
-    assert!(found.iter().map(|x| x.to_bits()).eq(scalar.iter().map(|x| x.to_bits())));
 }
 
 proptest! {
@@ -161,12 +178,14 @@ proptest! {
         let mut inverses = Vec::new();
         eliminate(tiled.front(), &mut inverses).unwrap();
         tiled.inverses = inverses;
-        let (plain, finished) = eliminate_plainly(shape, entries);
-        for (found, exact) in tiled.lower().iter().zip(&plain) {
-            prop_assert!((found - exact).abs() < 1e-12);
+        let plain = eliminate_plainly(shape, entries);
+        let height = width + below;
+        let lower = (0..height).flat_map(|column| column * height + column..(column + 1) * height);
+        for (found, entry) in tiled.lower().iter().zip(lower) {
+            prop_assert!((found - plain[entry]).abs() < 1e-12);
         }
-        check::<f64>(&tiled, &finished, 1e-12);
-        check::<f32>(&tiled, &finished, 1e-5);
+        check::<f64>(&tiled, &plain, 1e-12);
+        check::<f32>(&tiled, &plain, 1e-5);
 
         let (mut scalar, mut inverses) = (given, Vec::new());
         let task = Elimination { front: scalar.front(), inverses: &mut inverses };
