@@ -250,9 +250,21 @@ impl MovingBody {
 
     /// Forgets what a step that failed has found out; contact forces are set by the caller.
     pub(crate) fn undo(&mut self) {
-        if let BodyKind::Elastic(elastic) = &mut self.kind {
-            elastic.undo();
+        if let BodyKind::Elastic(elastic) = &mut self.kind
+            && elastic.undo()
+        {
+            self.compliance.clear();
         }
+    }
+
+    /// Makes the matrix anew if the passes of the step diverge; the step must begin again then.
+    pub(crate) fn renew_if_diverging(&mut self) -> bool {
+        let BodyKind::Elastic(elastic) = &mut self.kind else { return false };
+        let changed = elastic.renew_if_diverging(&self.positions);
+        if changed {
+            self.compliance.clear();
+        }
+        changed
     }
 
     /// The first node whose next state is not finite.
@@ -310,12 +322,14 @@ impl MovingBody {
         }
         std::mem::swap(&mut self.positions, &mut self.next_positions);
         std::mem::swap(&mut self.velocities, &mut self.next_velocities);
-        self.refactored = match &mut self.kind {
-            BodyKind::Elastic(elastic) => elastic.refresh_if_slow(&self.positions),
-            BodyKind::Rigid(_) => false,
-        };
-        if self.refactored {
-            self.compliance.clear();
+        self.refactored = false;
+        if let BodyKind::Elastic(elastic) = &mut self.kind {
+            let renewed = elastic.begin_next();
+            let refreshed = elastic.refresh_if_slow(&self.positions);
+            if refreshed {
+                self.compliance.clear();
+            }
+            self.refactored = renewed || refreshed;
         }
     }
 }

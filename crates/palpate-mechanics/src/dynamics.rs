@@ -369,39 +369,12 @@ impl Dynamics {
         penetration: &[PenetratingNode],
     ) -> Result<StepStats, MechanicsError> {
         let mut stats = StepStats::default();
-        stats.times.predict = self.predict_time;
-        let time_step = self.options.time_step;
-
-        let start = Instant::now();
+        let detected = Detected { proximity, penetration };
         response.begin(|candidates| self.add_ties(candidates));
-        response.find(
-            Detected { proximity, penetration },
-            self.body_count(),
-            time_step,
-            self.threads.pool(),
-            |body| self.body(body),
-            |body| BodyView {
-                surface: &self.surfaces[body],
-                parameters: &self.parameters[body],
-                positions: &self.body(body).positions,
-            },
-        );
-        stats.times.filter = start.elapsed();
-
-        for pass in 1..=MAX_PASSES {
-            self.solve_contacts(response, &mut stats);
-            let start = Instant::now();
-            self.set_contact_forces(response.forces());
-            self.for_each_body(|_, body| body.advance(time_step));
-            let missed = response.take_missed(|body| self.body(body));
-            let again = pass < MAX_PASSES && (self.improve() || missed);
-            if again {
-                response.begin_again(self.body_count(), |body| self.body(body));
-            }
-            stats.times.advance += start.elapsed();
-            if !again {
-                break;
-            }
+        while self.pass_by_pass(response, detected, &mut stats) {
+            self.set_contact_forces(response.last().forces());
+            self.begin_part(self.part);
+            response.restart(|candidates| self.add_ties(candidates));
         }
         stats.candidates = response.candidate_count();
         stats.contacts = response.contacts().len();
@@ -415,7 +388,7 @@ impl Dynamics {
         stats.newton_iterations = iterations.max().unwrap_or(0) as usize;
         let start = Instant::now();
         self.for_each_body(|_, body| body.commit());
-        stats.times.refactor = start.elapsed();
+        stats.times.refactor += start.elapsed();
         let refactored = (0..self.body_count()).filter(|&body| self.body(body).refactored);
         stats.refactored = refactored.count();
         response.remember();
@@ -423,6 +396,64 @@ impl Dynamics {
         self.finish_drives();
         self.step += 1;
         Ok(stats)
+    }
+
+    /// Solves for the contact forces and the response of the bodies in turn; true if the step must begin again
+    /// with other matrices.
+    fn pass_by_pass(
+        &mut self,
+        response: &mut Response,
+        detected: Detected<'_>,
+        stats: &mut StepStats,
+    ) -> bool {
+        stats.times.predict += self.predict_time;
+        let time_step = self.options.time_step;
+        let start = Instant::now();
+        response.find(
+            detected,
+            self.body_count(),
+            time_step,
+            self.threads.pool(),
+            |body| self.body(body),
+            |body| BodyView {
+                surface: &self.surfaces[body],
+                parameters: &self.parameters[body],
+                positions: &self.body(body).positions,
+            },
+        );
+        stats.times.filter += start.elapsed();
+
+        for pass in 1..=MAX_PASSES {
+            self.solve_contacts(response, stats);
+            let start = Instant::now();
+            self.set_contact_forces(response.forces());
+            self.for_each_body(|_, body| body.advance(time_step));
+            let missed = response.take_missed(|body| self.body(body));
+            let again = pass < MAX_PASSES && (self.improve() || missed);
+            stats.times.advance += start.elapsed();
+            if !again {
+                break;
+            }
+            let start = Instant::now();
+            let renewed = self.renew_diverging();
+            stats.times.refactor += start.elapsed();
+            if renewed {
+                return true;
+            }
+            let start = Instant::now();
+            response.begin_again(self.body_count(), |body| self.body(body));
+            stats.times.advance += start.elapsed();
+        }
+        false
+    }
+
+    /// Makes the matrices anew of bodies that go ever farther from pass to pass; true if there are any.
+    fn renew_diverging(&mut self) -> bool {
+        let renewed = AtomicUsize::new(0);
+        self.for_each_body(|_, body| {
+            renewed.fetch_add(usize::from(body.renew_if_diverging()), Ordering::Relaxed);
+        });
+        renewed.into_inner() > 0
     }
 
     /// Goes back to before the step that has begun.

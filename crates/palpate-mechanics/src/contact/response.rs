@@ -49,6 +49,13 @@ impl Response {
 
     /// Begins a step with the ties that `add` writes.
     pub(crate) fn begin(&mut self, add: impl FnOnce(&mut Vec<Candidate>)) {
+        std::mem::swap(&mut self.contacts, &mut self.contacts_before);
+        self.restart(add);
+    }
+
+    /// Begins the step that is under way once more.
+    pub(crate) fn restart(&mut self, add: impl FnOnce(&mut Vec<Candidate>)) {
+        self.contacts.clear();
         self.candidates.clear();
         add(&mut self.candidates);
         self.ties = self.candidates.len();
@@ -84,8 +91,6 @@ impl Response {
         });
         self.guess.clone_from(&self.last);
         self.problem.collect(&self.candidates, body_count, &body);
-        std::mem::swap(&mut self.contacts, &mut self.contacts_before);
-        self.contacts.clear();
     }
 
     /// Takes in the pairs that the step brought together although it was not expected; true if
