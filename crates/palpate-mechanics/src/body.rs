@@ -47,6 +47,9 @@ pub(crate) struct MovingBody {
     pub(crate) refactored: bool,
 }
 
+/// A step that begins again looks for pairs so many times farther away than the first try came.
+const WIDER: f64 = 1.2;
+
 /// How far the surface moves in the step that has begun.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Motion {
@@ -56,6 +59,20 @@ pub(crate) struct Motion {
     pub(crate) spread: f64,
     /// How much closer two nodes come to each other by the deformation, at most [m].
     pub(crate) deformation: f64,
+}
+
+impl Motion {
+    /// How much closer two surfaces come to each other at most [m].
+    pub(crate) fn approach(&self, other: &Self) -> f64 {
+        (self.mean - other.mean).length() + self.spread + other.spread
+    }
+
+    /// Takes in that the surface moves as `other` does as well.
+    pub(crate) fn widen(&mut self, other: &Self) {
+        let apart = (self.mean - other.mean).length();
+        self.spread = self.spread.max(other.spread + apart) * WIDER;
+        self.deformation = self.deformation.max(other.deformation) * WIDER;
+    }
 }
 
 pub(crate) enum BodyKind {
@@ -157,15 +174,19 @@ impl MovingBody {
                 }
             }
         }
-        self.motion = self.expected_motion(surface, time_step);
+        // If contact forces stay as they are: without them a body at rest would look for contacts much
+        // too far away.
+        self.motion = self.motion_to(&self.expected_positions, surface, time_step);
     }
 
-    /// How far the surface moves if contact forces stay as they are: without them a body at rest would
-    /// look for contacts much too far away.
-    fn expected_motion(&self, surface: &[u32], time_step: f64) -> Motion {
+    /// How far the surface has moved in the step that is about to end.
+    pub(crate) fn moved(&self, surface: &[u32], time_step: f64) -> Motion {
+        self.motion_to(&self.next_positions, surface, time_step)
+    }
+
+    fn motion_to(&self, end: &[Point], surface: &[u32], time_step: f64) -> Motion {
         let displacement = |&node: &u32| {
-            DVec3::from_array(self.expected_positions[node as usize])
-                - DVec3::from_array(self.positions[node as usize])
+            DVec3::from_array(end[node as usize]) - DVec3::from_array(self.positions[node as usize])
         };
         let mean = surface.iter().map(displacement).sum::<DVec3>() / surface.len().max(1) as f64;
         let spread = surface.iter().map(|node| (displacement(node) - mean).length());
