@@ -124,6 +124,15 @@ enum Packed {
     Double(PackedFactor<f64>),
 }
 
+/// Memory for a solve with a known right-hand side.
+#[derive(Default)]
+struct ProbeMemory {
+    rhs: Vec<[f64; 3]>,
+    solution: Vec<[f64; 3]>,
+    residual: Vec<[f64; 3]>,
+    workspace: SolveWorkspace,
+}
+
 /// What a solve with a known right-hand side leaves.
 struct Probe {
     /// Relative to the right-hand side.
@@ -307,7 +316,7 @@ impl Cholesky {
         self.give_memory();
         let memory = self.memory.clone();
         let mut memory = memory.lock();
-        let Memory { fronts, contributions: spare, single, double } = &mut *memory;
+        let Memory { fronts, probe, contributions: spare, single, double } = &mut *memory;
         let mut contributions = Vec::new();
         let is_single = self.precision == Precision::Single && {
             let known = change.and_then(|change| Some((change, change.older.packed.single()?)));
@@ -318,7 +327,7 @@ impl Cholesky {
                 .map_err(|place| self.not_positive(place))?;
             self.packed = Packed::Single(packed);
             contributions = plan.into_kept();
-            let Probe { residual, error } = self.probe(matrix);
+            let Probe { residual, error } = self.probe(matrix, probe);
             residual < SINGLE_PROBE_TOLERANCES[0] && error < SINGLE_PROBE_TOLERANCES[1]
         };
         if !is_single {
@@ -330,7 +339,7 @@ impl Cholesky {
                 .map_err(|place| self.not_positive(place))?;
             self.packed = Packed::Double(packed);
             contributions = plan.into_kept();
-            let Probe { residual, .. } = self.probe(matrix);
+            let Probe { residual, .. } = self.probe(matrix, probe);
             let is_accurate = residual < PROBE_TOLERANCE;
             if !is_accurate {
                 return Err(FactorError::Inaccurate { residual });
@@ -378,26 +387,27 @@ impl Cholesky {
 
     /// What a solve with a known right-hand side leaves: a matrix may be positive definite and yet
     /// have no factor of use.
-    fn probe(&self, matrix: &BlockMatrix) -> Probe {
+    fn probe(&self, matrix: &BlockMatrix, memory: &mut ProbeMemory) -> Probe {
+        let ProbeMemory { rhs, solution, residual, workspace } = memory;
         let count = self.pattern.node_count();
         let mut state = 1_u32;
         let mut draw = || {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
             f64::from(state >> 8) / f64::from(1 << 24) - 0.5
         };
-        let rhs: Vec<[f64; 3]> = (0..count).map(|_| std::array::from_fn(|_| draw())).collect();
-        let mut workspace = self.workspace();
-        let mut solution = rhs.clone();
-        self.solve_in_place(&mut solution, &mut workspace);
-        let mut residual = vec![[0.0; 3]; count];
-        matrix.multiply(&solution, &mut residual);
+        rhs.clear();
+        rhs.extend((0..count).map(|_| -> [f64; 3] { std::array::from_fn(|_| draw()) }));
+        solution.clone_from(rhs);
+        self.solve_in_place(solution, workspace);
+        residual.resize(count, [0.0; 3]);
+        matrix.multiply(solution, residual);
         for (p, r) in residual.as_flattened_mut().iter_mut().zip(rhs.as_flattened()) {
             *p -= r;
         }
         let norm = |v: &[[f64; 3]]| v.as_flattened().iter().map(|x| x * x).sum::<f64>().sqrt();
-        let left = norm(&residual) / norm(&rhs);
-        self.solve_in_place(&mut residual, &mut workspace);
-        Probe { residual: left, error: norm(&residual) / norm(&solution) }
+        let left = norm(residual) / norm(rhs);
+        self.solve_in_place(residual, workspace);
+        Probe { residual: left, error: norm(residual) / norm(solution) }
     }
 
     /// The order of elimination.

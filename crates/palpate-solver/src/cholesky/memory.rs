@@ -2,6 +2,7 @@
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
+use super::ProbeMemory;
 use super::multifrontal::Fronts;
 use super::packed::Panel;
 use super::tiles::Column;
@@ -14,6 +15,7 @@ pub(super) struct SharedMemory(Arc<Mutex<Memory>>);
 #[derive(Default)]
 pub(super) struct Memory {
     pub(super) fronts: Fronts,
+    pub(super) probe: ProbeMemory,
     pub(super) contributions: Spare<Column>,
     pub(super) single: Spare<Panel<f32>>,
     pub(super) double: Spare<Panel<f64>>,
