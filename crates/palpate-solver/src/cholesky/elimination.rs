@@ -6,7 +6,7 @@ use pulp::{Simd, WithSimd};
 
 use super::front::Front;
 use super::tiles::{
-    Block, Column, GROUP, ROWS, multiply_transposed, negative_transposed, subtract_transposed,
+    Block, Column, Effect, GROUP, ROWS, multiply_by_transposed_triangle, multiply_transposed,
 };
 
 #[cfg(test)]
@@ -40,14 +40,15 @@ impl WithSimd for Elimination<'_> {
         for tile in 0..triangle.tile_count() {
             let (above, rows) = top.split_at_mut(triangle.tile(tile).start);
             let rows = &mut rows[..triangle.tile(tile).len()];
+            let size = ROWS.min(shape.width - ROWS * tile);
             for (block, inverse) in inverses[..tile].iter().enumerate() {
-                solve(simd, rows, &above[triangle.tile(block)], inverse, block);
+                solve(simd, rows, size, &above[triangle.tile(block)], inverse, block);
             }
             let (done, diagonal) = rows.split_at_mut(ROWS * tile);
             for (group, target) in diagonal.chunks_exact_mut(GROUP).enumerate() {
-                subtract_transposed(simd, done, done, group, target);
+                let lower = GROUP * group..size;
+                multiply_transposed(simd, done, done, group, lower, Effect::Subtract, target);
             }
-            let size = ROWS.min(shape.width - ROWS * tile);
             factor_block(simd, diagonal, &mut inverses[tile], size)
                 .map_err(|column| ROWS * tile + column)?;
         }
@@ -56,8 +57,9 @@ impl WithSimd for Elimination<'_> {
         for tile in 0..shape.bottom_tile_count() {
             let (above, rows) = bottom.split_at_mut(tile * width);
             let rows = &mut rows[..width];
+            let size = ROWS.min(shape.below - ROWS * tile);
             for (block, inverse) in inverses.iter().enumerate() {
-                solve(simd, rows, &top[triangle.tile(block)], inverse, block);
+                solve(simd, rows, size, &top[triangle.tile(block)], inverse, block);
             }
             let left = &rows[..shape.width];
             let target = &mut contribution[contributions.tile(tile)];
@@ -65,7 +67,9 @@ impl WithSimd for Elimination<'_> {
                 let right =
                     if block < tile { &above[block * width..][..shape.width] } else { left };
                 for (group, target) in target.chunks_exact_mut(GROUP).enumerate() {
-                    negative_transposed(simd, left, right, group, target);
+                    let first = if block < tile { 0 } else { GROUP * group };
+                    let effect = Effect::ReplaceByNegative;
+                    multiply_transposed(simd, left, right, group, first..size, effect, target);
                 }
             }
         }
@@ -73,24 +77,25 @@ impl WithSimd for Elimination<'_> {
     }
 }
 
-/// Turns a block of columns of a tile of rows into that of the factor, the ones before it being done;
-/// `above` is the tile with that block on the diagonal.
+/// Turns a block of columns of a tile into that of the factor in the first `size` rows, the blocks before
+/// it being done; `above` is the tile with that block on the diagonal.
 #[inline(always)]
 pub(super) fn solve<S: Simd>(
     simd: S,
-    rows: &mut [Column],
+    tile: &mut [Column],
+    size: usize,
     above: &[Column],
     inverse: &Block,
     block: usize,
 ) {
-    let (done, columns) = rows.split_at_mut(ROWS * block);
+    let (done, columns) = tile.split_at_mut(ROWS * block);
     let count = columns.len().min(ROWS);
     let columns = &mut columns[..count];
     let above = &above[..ROWS * block];
     for (group, target) in columns.chunks_exact_mut(GROUP).enumerate() {
-        subtract_transposed(simd, done, above, group, target);
+        multiply_transposed(simd, done, above, group, 0..size, Effect::Subtract, target);
     }
-    multiply_transposed(simd, columns, inverse);
+    multiply_by_transposed_triangle(simd, columns, inverse, size);
 }
 
 /// Cholesky factor of a block in its lower triangle, and the inverse of that: what is done to the rows of

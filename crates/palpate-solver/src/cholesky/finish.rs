@@ -164,7 +164,8 @@ impl<T: Real> Finish<T> {
             }
             for other in tile + 1..tiles.end {
                 let above = &columns[triangle.tile(other)][ROWS * tile..];
-                solve(simd, rows, above, &inverses[other], other - tile);
+                let size = ROWS.min(piece.shape.width + piece.first - ROWS * tile);
+                solve(simd, rows, size, above, &inverses[other], other - tile);
             }
         }
     }

@@ -60,22 +60,111 @@ impl Triangle {
     }
 }
 
-/// Sums of a product: vectors of some columns.
-type Sums<S> = [[<S as Simd>::f64s; VECTORS]; GROUP];
+/// What a product does to the target.
+#[derive(Clone, Copy)]
+pub(super) enum Effect {
+    Subtract,
+    ReplaceByNegative,
+}
 
-/// Products of columns of `left`, in the rows of one `part` of the tile, with rows `GROUP * group..` of
-/// the same columns of `right`.
+/// The product of `left` with the transpose of rows `GROUP * group..` of `right`, in some rows of four
+/// columns, and as many after them as fill vectors.
 #[inline(always)]
-fn products<S: Simd>(
+pub(super) fn multiply_transposed<S: Simd>(
     simd: S,
     left: &[Column],
     right: &[Column],
     group: usize,
-    part: usize,
-) -> Sums<S> {
-    let mut sums = [[simd.splat_f64s(0.0); VECTORS]; GROUP];
+    rows: Range<usize>,
+    effect: Effect,
+    target: &mut [Column],
+) {
+    let mut vector = rows.start / S::F64_LANES;
+    let end = rows.end.div_ceil(S::F64_LANES);
+    while vector < end {
+        vector += match end - vector {
+            1 => multiply_vectors::<S, 1>(simd, left, right, group, vector, effect, target),
+            2 => multiply_vectors::<S, 2>(simd, left, right, group, vector, effect, target),
+            _ => multiply_vectors::<S, VECTORS>(simd, left, right, group, vector, effect, target),
+        };
+    }
+}
+
+/// The same for `V` vectors of each column; how many they are.
+#[inline(always)]
+fn multiply_vectors<S: Simd, const V: usize>(
+    simd: S,
+    left: &[Column],
+    right: &[Column],
+    group: usize,
+    vector: usize,
+    effect: Effect,
+    target: &mut [Column],
+) -> usize {
+    let sums = products::<S, V>(simd, left, right, group, vector);
+    for (target, sums) in target.iter_mut().zip(sums) {
+        let target = &mut vectors_mut::<S>(target)[vector..][..V];
+        for (target, sum) in target.iter_mut().zip(sums) {
+            *target = match effect {
+                Effect::Subtract => simd.sub_f64s(*target, sum),
+                Effect::ReplaceByNegative => simd.neg_f64s(sum),
+            };
+        }
+    }
+    V
+}
+
+/// Multiplies some rows of a tile, and as many after them as fill vectors, by the transpose of a lower
+/// triangle.
+#[inline(always)]
+pub(super) fn multiply_by_transposed_triangle<S: Simd>(
+    simd: S,
+    tile: &mut [Column],
+    triangle: &Block,
+    rows: usize,
+) {
+    let end = rows.div_ceil(S::F64_LANES);
+    let mut vector = 0;
+    while vector < end {
+        vector += match end - vector {
+            1 => triangle_vectors::<S, 1>(simd, tile, triangle, vector),
+            2 => triangle_vectors::<S, 2>(simd, tile, triangle, vector),
+            _ => triangle_vectors::<S, VECTORS>(simd, tile, triangle, vector),
+        };
+    }
+}
+
+/// The same for `V` vectors of each column; how many they are.
+#[inline(always)]
+fn triangle_vectors<S: Simd, const V: usize>(
+    simd: S,
+    tile: &mut [Column],
+    triangle: &Block,
+    vector: usize,
+) -> usize {
+    // From the last columns on: the product needs none after them.
+    for group in (0..tile.len() / GROUP).rev() {
+        let tile = &mut tile[..GROUP * (group + 1)];
+        let sums = products::<S, V>(simd, tile, triangle, group, vector);
+        for (target, sums) in tile[GROUP * group..].iter_mut().zip(sums) {
+            vectors_mut::<S>(target)[vector..][..V].copy_from_slice(&sums);
+        }
+    }
+    V
+}
+
+/// Products of vectors of the columns of `left` with rows `GROUP * group..` of the same columns of `right`.
+#[inline(always)]
+fn products<S: Simd, const V: usize>(
+    simd: S,
+    left: &[Column],
+    right: &[Column],
+    group: usize,
+    vector: usize,
+) -> [[S::f64s; V]; GROUP] {
+    let mut sums = [[simd.splat_f64s(0.0); V]; GROUP];
     for (left, right) in left.iter().zip(right) {
-        let left = &vectors::<S>(left)[part * VECTORS..][..VECTORS];
+        let left = &vectors::<S>(left)[vector..][..V];
         for (sums, &factor) in sums.iter_mut().zip(&right.0[group]) {
             let factor = simd.splat_f64s(factor);
             for (sum, &value) in sums.iter_mut().zip(left) {
@@ -94,66 +183,4 @@ fn vectors<S: Simd>(column: &Column) -> &[S::f64s] {
 #[inline(always)]
 fn vectors_mut<S: Simd>(column: &mut Column) -> &mut [S::f64s] {
     S::as_mut_simd_f64s(column.0.as_flattened_mut()).0
-}
-
-/// Parts that a tile's rows are summed in.
-#[inline(always)]
-fn parts<S: Simd>() -> usize {
-    ROWS / (VECTORS * S::F64_LANES)
-}
-
-/// Subtracts from four columns the product of `left` with the transpose of rows `GROUP * group..` of `right`.
-#[inline(always)]
-pub(super) fn subtract_transposed<S: Simd>(
-    simd: S,
-    left: &[Column],
-    right: &[Column],
-    group: usize,
-    target: &mut [Column],
-) {
-    for part in 0..parts::<S>() {
-        let sums = products(simd, left, right, group, part);
-        for (target, sums) in target.iter_mut().zip(sums) {
-            let target = &mut vectors_mut::<S>(target)[part * VECTORS..][..VECTORS];
-            for (target, sum) in target.iter_mut().zip(sums) {
-                *target = simd.sub_f64s(*target, sum);
-            }
-        }
-    }
-}
-
-/// Writes to four columns the negative product of `left` with the transpose of rows `GROUP * group..` of
-/// `right`.
-#[inline(always)]
-pub(super) fn negative_transposed<S: Simd>(
-    simd: S,
-    left: &[Column],
-    right: &[Column],
-    group: usize,
-    target: &mut [Column],
-) {
-    for part in 0..parts::<S>() {
-        let sums = products(simd, left, right, group, part);
-        for (target, sums) in target.iter_mut().zip(sums) {
-            let target = &mut vectors_mut::<S>(target)[part * VECTORS..][..VECTORS];
-            for (target, sum) in target.iter_mut().zip(sums) {
-                *target = simd.neg_f64s(sum);
-            }
-        }
-    }
-}
-
-/// Multiplies a tile by the transpose of a lower triangular `right`.
-#[inline(always)]
-pub(super) fn multiply_transposed<S: Simd>(simd: S, tile: &mut [Column], right: &Block) {
-    // From the last columns on: the product needs none after them.
-    for group in (0..tile.len() / GROUP).rev() {
-        let tile = &mut tile[..GROUP * (group + 1)];
-        for part in 0..parts::<S>() {
-            let sums = products(simd, tile, right, group, part);
-            for (target, sums) in tile[GROUP * group..].iter_mut().zip(sums) {
-                vectors_mut::<S>(target)[part * VECTORS..][..VECTORS].copy_from_slice(&sums);
-            }
-        }
-    }
 }
