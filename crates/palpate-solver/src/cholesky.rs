@@ -9,6 +9,7 @@ mod half;
 mod memory;
 mod multifrontal;
 mod packed;
+mod probe;
 mod real;
 mod supernodes;
 mod tiles;
@@ -20,17 +21,11 @@ pub use half::{HalfSolution, half_products};
 use half::{HalfWorkspace, NODES, Paths};
 use memory::{Memory, SharedMemory};
 use packed::{PackedFactor, PackedWorkspace};
+use probe::Probe;
 use supernodes::Supernodes;
 
 /// Columns of its nodes must have 32-bit numbers.
 const MOST_NODES: usize = u32::MAX as usize / 3;
-/// Largest residual of the probe solve, relative to the right-hand side.
-const PROBE_TOLERANCE: f64 = 1e-6;
-/// The same for a factor kept in single precision, and the largest error relative to the solution;
-/// beyond them, it is kept in double precision. Rounding the soft part of a solution leaves a
-/// residual in the stiff part, where it moves nothing: the error is a thousandth of it.
-const SINGLE_PROBE_TOLERANCES: [f64; 2] = [1e-2, 1e-5];
-
 /// The precision that a factor is kept and solved in. It is always computed in double precision.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Precision {
@@ -122,23 +117,6 @@ struct Change<'a> {
 enum Packed {
     Single(PackedFactor<f32>),
     Double(PackedFactor<f64>),
-}
-
-/// Memory for a solve with a known right-hand side.
-#[derive(Default)]
-struct ProbeMemory {
-    rhs: Vec<[f64; 3]>,
-    solution: Vec<[f64; 3]>,
-    residual: Vec<[f64; 3]>,
-    workspace: SolveWorkspace,
-}
-
-/// What a solve with a known right-hand side leaves.
-struct Probe {
-    /// Relative to the right-hand side.
-    residual: f64,
-    /// Estimated, relative to the solution.
-    error: f64,
 }
 
 impl Packed {
@@ -327,8 +305,7 @@ impl Cholesky {
                 .map_err(|place| self.not_positive(place))?;
             self.packed = Packed::Single(packed);
             contributions = plan.into_kept();
-            let Probe { residual, error } = self.probe(matrix, probe);
-            residual < SINGLE_PROBE_TOLERANCES[0] && error < SINGLE_PROBE_TOLERANCES[1]
+            Probe::new(self, matrix, probe).is_accurate_in_single()
         };
         if !is_single {
             let known = change.and_then(|change| Some((change, change.older.packed.double()?)));
@@ -339,10 +316,9 @@ impl Cholesky {
                 .map_err(|place| self.not_positive(place))?;
             self.packed = Packed::Double(packed);
             contributions = plan.into_kept();
-            let Probe { residual, .. } = self.probe(matrix, probe);
-            let is_accurate = residual < PROBE_TOLERANCE;
-            if !is_accurate {
-                return Err(FactorError::Inaccurate { residual });
+            let probe = Probe::new(self, matrix, probe);
+            if !probe.is_accurate() {
+                return Err(FactorError::Inaccurate { residual: probe.residual });
             }
         }
         memory.trim();
@@ -383,31 +359,6 @@ impl Cholesky {
         let place = place.min(3 * self.order.nodes.len() - 1);
         let node = self.order.nodes[place / 3] as usize;
         FactorError::NotPositiveDefinite { node, column: 3 * node + place % 3 }
-    }
-
-    /// What a solve with a known right-hand side leaves: a matrix may be positive definite and yet
-    /// have no factor of use.
-    fn probe(&self, matrix: &BlockMatrix, memory: &mut ProbeMemory) -> Probe {
-        let ProbeMemory { rhs, solution, residual, workspace } = memory;
-        let count = self.pattern.node_count();
-        let mut state = 1_u32;
-        let mut draw = || {
-            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            f64::from(state >> 8) / f64::from(1 << 24) - 0.5
-        };
-        rhs.clear();
-        rhs.extend((0..count).map(|_| -> [f64; 3] { std::array::from_fn(|_| draw()) }));
-        solution.clone_from(rhs);
-        self.solve_in_place(solution, workspace);
-        residual.resize(count, [0.0; 3]);
-        matrix.multiply(solution, residual);
-        for (p, r) in residual.as_flattened_mut().iter_mut().zip(rhs.as_flattened()) {
-            *p -= r;
-        }
-        let norm = |v: &[[f64; 3]]| v.as_flattened().iter().map(|x| x * x).sum::<f64>().sqrt();
-        let left = norm(residual) / norm(rhs);
-        self.solve_in_place(residual, workspace);
-        Probe { residual: left, error: norm(residual) / norm(solution) }
     }
 
     /// The order of elimination.

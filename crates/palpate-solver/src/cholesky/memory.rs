@@ -2,9 +2,9 @@
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use super::ProbeMemory;
 use super::multifrontal::Fronts;
 use super::packed::Panel;
+use super::probe::ProbeMemory;
 use super::tiles::Column;
 
 /// Memory that a factor shares with those that it was changed from.
