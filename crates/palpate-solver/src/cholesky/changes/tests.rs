@@ -18,6 +18,8 @@ struct Mesh {
     order: Vec<u32>,
     elements: Vec<Element>,
     next_name: u32,
+    /// What new nodes are copies of.
+    copies: Vec<(u32, u32)>,
     /// Held by almost nothing: single precision cannot solve it.
     is_loose: bool,
     /// A node that is pushed away.
@@ -107,6 +109,7 @@ impl Mesh {
                 let place = pick(node, self.order.len());
                 let old = self.order[place];
                 let new = self.add_node(place + 1);
+                self.copies.push((new, old));
                 let around = self.elements.iter_mut().filter(|e| e.nodes.contains(&old));
                 for (index, element) in around.enumerate() {
                     if sides >> (index % 32) & 1 == 1 {
@@ -268,8 +271,13 @@ impl History {
             mesh.apply(change);
         }
         let matrix = mesh.matrix();
-        let origins: Vec<Option<u32>> =
-            mesh.nodes.iter().map(|&name| self.mesh.number(name)).collect();
+        // Some copies name the same origin as the node that they are copies of.
+        let copied = |name: u32| mesh.copies.iter().find(|&&(new, _)| new == name && new % 2 == 0);
+        let origin = |&name: &u32| {
+            let of_copy = || copied(name).and_then(|&(_, old)| self.mesh.number(old));
+            self.mesh.number(name).or_else(of_copy)
+        };
+        let origins: Vec<Option<u32>> = mesh.nodes.iter().map(origin).collect();
         let changed = self.factor.changed(&matrix, mesh.order(&matrix), &origins);
         match (changed, Cholesky::in_order(&matrix, self.factor.precision, mesh.order(&matrix))) {
             (Ok(changed), Ok(fresh)) => {
