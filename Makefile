@@ -104,7 +104,7 @@ wheel: $(BIN)/maturin ## Build a wheel for any Python from 3.10 on, and try it i
 	$(PYTHON) tests/try_wheel.py dist
 
 crates: ## Pack the Rust crates as they would be published, and build them from that
-	cargo package --locked --workspace --exclude palpate-python --exclude palpate-fuzz
+	cargo package --locked --workspace --exclude palpate-python --exclude palpate-fuzz --exclude palpate-testing
 
 models: install ## Make the example organs again
 	$(BIN)/python python/palpate/models/make_models.py

@@ -4,37 +4,10 @@
 #[expect(dead_code, reason = "the other tests use the rest")]
 mod scenes;
 
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::sync::atomic::{AtomicUsize, Ordering};
-
 use palpate_contact::{IntersectionOptions, Method, ProximityOptions, Scene, SceneOptions};
+use palpate_testing::{Counting, allocations};
 
 use scenes::{Random, as_slices, deforming, horseshoe, jittered, soup};
-
-struct Counting;
-
-static ALLOCATIONS: AtomicUsize = AtomicUsize::new(0);
-
-#[expect(unsafe_code, reason = "an allocator cannot be written without")]
-// SAFETY: every call is handed to the system allocator unchanged.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
-        // SAFETY: the caller keeps the contract of `GlobalAlloc::alloc`.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: the caller keeps the contract of `GlobalAlloc::dealloc`.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-
-    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, new_size: usize) -> *mut u8 {
-        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
-        // SAFETY: the caller keeps the contract of `GlobalAlloc::realloc`.
-        unsafe { System.realloc(pointer, layout, new_size) }
-    }
-}
 
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
@@ -78,9 +51,9 @@ fn a_frame_allocates_nothing() {
             }
         };
         round(&mut scene);
-        let before = ALLOCATIONS.load(Ordering::Relaxed);
+        let before = allocations();
         round(&mut scene);
-        assert_eq!(ALLOCATIONS.load(Ordering::Relaxed) - before, 0, "{method:?}");
+        assert_eq!(allocations() - before, 0, "{method:?}");
         assert!(found.iter().all(|&count| count > 0), "{found:?}");
     }
 }

@@ -7,7 +7,6 @@
 #![expect(clippy::print_stdout, clippy::print_stderr, reason = "a program that talks")]
 
 mod choices;
-mod counting_allocator;
 mod mutate;
 mod random;
 mod run;
@@ -22,7 +21,7 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use run::{Finding, Fuzzer};
 
 #[global_allocator]
-static ALLOCATOR: counting_allocator::Counting = counting_allocator::Counting;
+static ALLOCATOR: palpate_testing::Counting = palpate_testing::Counting;
 
 const USAGE: &str = "palpate-fuzz TARGET SECONDS [SEED] | palpate-fuzz TARGET --input FILE";
 

@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use crate::counting_allocator::peak_of;
+use palpate_testing::peak_of;
+
 use crate::mutate::mutated;
 use crate::random::Random;
 use crate::targets::Target;

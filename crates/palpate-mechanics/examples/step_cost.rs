@@ -14,31 +14,14 @@ use palpate_contact::{Scene, SceneOptions};
 use palpate_geometry::Point;
 use palpate_mechanics::{Dynamics, DynamicsOptions, StepStats};
 use palpate_model::{Body, Material, Mesh, MeshData, Model, ReadOptions, RigidMotion, read_mesh};
+use palpate_testing::{Fastest, box_of_cells};
 
 const STEPS: usize = 200;
 
 fn block() -> Result<Mesh, Box<dyn Error>> {
-    let cells = [16_u32, 11, 11];
-    let at = |i: u32, j: u32, k: u32| i + (cells[0] + 1) * (j + (cells[1] + 1) * k);
-    let mut data = MeshData::default();
-    for k in 0..=cells[2] {
-        for j in 0..=cells[1] {
-            for i in 0..=cells[0] {
-                data.nodes.push([i, j, k].map(|n| 0.006 * f64::from(n)));
-            }
-        }
-    }
-    for k in 0..cells[2] {
-        for j in 0..cells[1] {
-            for i in 0..cells[0] {
-                let corner = |b: u32| at(i + (b & 1), j + (b >> 1 & 1), k + (b >> 2 & 1));
-                for path in [[1, 3], [3, 2], [2, 6], [6, 4], [4, 5], [5, 1]] {
-                    data.tetrahedra.push([0, path[0], path[1], 7].map(corner));
-                }
-            }
-        }
-    }
-    Ok(Mesh::new(data)?)
+    let place = |at: [f64; 3]| at.map(|index| 0.006 * index);
+    let (nodes, tetrahedra) = box_of_cells([16, 11, 11], Fastest::First, place);
+    Ok(Mesh::new(MeshData { nodes, tetrahedra, ..MeshData::default() })?)
 }
 
 fn floor(bounds: palpate_geometry::Aabb) -> Result<Mesh, Box<dyn Error>> {

@@ -15,6 +15,7 @@ use std::time::Instant;
 use palpate_geometry::Point;
 use palpate_model::Law as Name;
 use palpate_solver::BlockMatrix;
+use palpate_testing::{Fastest, box_of_cells};
 use source::tissue::law::{FibreParameters, Lame, Law, Parameters};
 use source::tissue::{Tissue, TissueInput, VolumeAveraging};
 
@@ -98,36 +99,5 @@ fn measure(rounds: usize, mut call: impl FnMut()) -> [f64; 3] {
 
 /// A unit cube of `cells`³ cells of six tetrahedra.
 fn block(cells: usize) -> (Vec<Point>, Vec<[u32; 4]>) {
-    let nodes = cells + 1;
-    let mut rest = Vec::new();
-    for index in 0..nodes.pow(3) {
-        let [i, j, k] = [index / (nodes * nodes), index / nodes % nodes, index % nodes];
-        rest.push([i, j, k].map(|value| value as f64 / cells as f64));
-    }
-    let mut tetrahedra = Vec::new();
-    for cell in 0..cells.pow(3) {
-        let place = [cell / (cells * cells), cell / cells % cells, cell % cells];
-        for (order, odd) in [
-            ([0, 1, 2], false),
-            ([1, 2, 0], false),
-            ([2, 0, 1], false),
-            ([0, 2, 1], true),
-            ([2, 1, 0], true),
-            ([1, 0, 2], true),
-        ] {
-            let mut corner = place;
-            let mut corners = [0; 4];
-            for step in 0..4 {
-                corners[step] = ((corner[0] * nodes + corner[1]) * nodes + corner[2]) as u32;
-                if step < 3 {
-                    corner[order[step]] += 1;
-                }
-            }
-            if odd {
-                corners.swap(2, 3);
-            }
-            tetrahedra.push(corners);
-        }
-    }
-    (rest, tetrahedra)
+    box_of_cells([cells; 3], Fastest::Last, |at| at.map(|index| index / cells as f64))
 }

@@ -4,35 +4,9 @@
 #[expect(dead_code, reason = "the other tests use the rest")]
 mod world;
 
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::sync::atomic::{AtomicUsize, Ordering};
+use palpate_testing::{Counting, allocations};
 
 use world::{GRAVITY, World, box_mesh, floor, model, rigid, soft};
-
-struct Counting;
-
-static ALLOCATIONS: AtomicUsize = AtomicUsize::new(0);
-
-#[expect(unsafe_code, reason = "an allocator cannot be written without")]
-// SAFETY: every call is handed to the system allocator unchanged.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
-        // SAFETY: the caller keeps the contract of `GlobalAlloc::alloc`.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: the caller keeps the contract of `GlobalAlloc::dealloc`.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-
-    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, new_size: usize) -> *mut u8 {
-        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
-        // SAFETY: the caller keeps the contract of `GlobalAlloc::realloc`.
-        unsafe { System.realloc(pointer, layout, new_size) }
-    }
-}
 
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
@@ -62,13 +36,13 @@ fn a_step_at_rest_allocates_nothing() {
         let mut world = stack(friction);
         world.run(200);
         for _ in 0..30 {
-            let before = ALLOCATIONS.load(Ordering::Relaxed);
+            let before = allocations();
             world.dynamics.begin_step();
-            let begun = ALLOCATIONS.load(Ordering::Relaxed) - before;
+            let begun = allocations() - before;
             let (proximity, penetration) = world.detect();
-            let before = ALLOCATIONS.load(Ordering::Relaxed);
+            let before = allocations();
             let stats = world.dynamics.finish_step(&proximity, &penetration).expect("finite");
-            let count = ALLOCATIONS.load(Ordering::Relaxed) - before;
+            let count = allocations() - before;
             assert!(stats.contacts > 20, "{} contacts", stats.contacts);
             assert_eq!((begun, count), (0, 0), "friction {friction}, {stats:?}");
         }

@@ -3,39 +3,13 @@
 #[path = "support/boxes.rs"]
 mod boxes;
 
-use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 use boxes::box_data;
 use glam::DQuat;
 use palpate::model::{Body, RigidMotion};
 use palpate::{Mesh, MeshData, Model, Simulation, SimulationOptions};
-
-struct Counting;
-
-static ALLOCATIONS: AtomicUsize = AtomicUsize::new(0);
-
-#[expect(unsafe_code, reason = "an allocator cannot be written without")]
-// SAFETY: every call is handed to the system allocator unchanged.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
-        // SAFETY: the caller keeps the contract of `GlobalAlloc::alloc`.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: the caller keeps the contract of `GlobalAlloc::dealloc`.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-
-    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, new_size: usize) -> *mut u8 {
-        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
-        // SAFETY: the caller keeps the contract of `GlobalAlloc::realloc`.
-        unsafe { System.realloc(pointer, layout, new_size) }
-    }
-}
+use palpate_testing::{Counting, allocations};
 
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
@@ -66,17 +40,17 @@ fn ticks_and_steps_at_rest_allocate_nothing() {
     let mut contacts = 0;
     for step in 0..150 {
         for tick in 0..16 {
-            let before = ALLOCATIONS.load(Ordering::Relaxed);
+            let before = allocations();
             let felt = tool.tick(DQuat::IDENTITY, place(tick)).unwrap();
             if step >= 100 {
-                counted += ALLOCATIONS.load(Ordering::Relaxed) - before;
+                counted += allocations() - before;
                 contacts += felt.contacts;
             }
         }
-        let before = ALLOCATIONS.load(Ordering::Relaxed);
+        let before = allocations();
         simulation.step().unwrap();
         if step >= 100 {
-            counted += ALLOCATIONS.load(Ordering::Relaxed) - before;
+            counted += allocations() - before;
         }
     }
     assert!(contacts >= 50 * 16, "{contacts} contacts");

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use palpate_model::{Mesh, MeshData};
+use palpate_testing::{Fastest, box_of_cells};
 
 pub(crate) type Point = [f64; 3];
 pub(crate) type Positions = Vec<Vec<Point>>;
@@ -29,39 +30,10 @@ impl Random {
     }
 }
 
-/// Data of a block of unit cells from the origin, six tetrahedra each (Kuhn), its nodes moved by `map`.
+/// Data of a block of unit cells from the origin, its nodes moved by `map`.
 pub(crate) fn block_data(cells: [usize; 3], map: impl Fn(Point) -> Point) -> MeshData {
-    let [nx, ny, nz] = cells;
-    let node = |[x, y, z]: [usize; 3]| ((x * (ny + 1) + y) * (nz + 1) + z) as u32;
-    let mut data = MeshData::default();
-    for x in 0..=nx {
-        for y in 0..=ny {
-            for z in 0..=nz {
-                data.nodes.push(map([x as f64, y as f64, z as f64]));
-            }
-        }
-    }
-    // Each order of the axes is a way from the cell's first corner to its last; odd ones turn over.
-    let orders = [[0, 1, 2], [1, 2, 0], [2, 0, 1], [1, 0, 2], [0, 2, 1], [2, 1, 0]];
-    for x in 0..nx {
-        for y in 0..ny {
-            for z in 0..nz {
-                for (index, order) in orders.iter().enumerate() {
-                    let mut corner = [x, y, z];
-                    let mut tetrahedron = [node(corner); 4];
-                    for (step, &axis) in order.iter().enumerate() {
-                        corner[axis] += 1;
-                        tetrahedron[step + 1] = node(corner);
-                    }
-                    if index >= 3 {
-                        tetrahedron.swap(2, 3);
-                    }
-                    data.tetrahedra.push(tetrahedron);
-                }
-            }
-        }
-    }
-    data
+    let (nodes, tetrahedra) = box_of_cells(cells, Fastest::Last, map);
+    MeshData { nodes, tetrahedra, ..MeshData::default() }
 }
 
 pub(crate) fn block(cells: [usize; 3], map: impl Fn(Point) -> Point) -> Arc<Mesh> {

@@ -5,46 +5,19 @@ use std::collections::BTreeMap;
 use palpate_cutting::{Blade, Cut, CutOptions, cut, cut_on};
 use palpate_geometry::{Point, tetrahedron, vec3};
 use palpate_model::{Mesh, MeshData, NodeOrigin};
+use palpate_testing::{Fastest, box_of_cells};
 
 /// A box of `cells` unit cells of six tetrahedra, one corner at the origin, inner nodes moved by up
 /// to `jitter` of a cell; every tetrahedron is a region and has a fibre of its own.
 pub(crate) fn box_mesh(cells: [usize; 3], jitter: f64, seed: u64) -> Mesh {
-    let index = |[i, j, k]: [usize; 3]| (i + (cells[0] + 1) * (j + (cells[1] + 1) * k)) as u32;
     let mut random = Random(seed);
-    let mut nodes = Vec::new();
-    for k in 0..=cells[2] {
-        for j in 0..=cells[1] {
-            for i in 0..=cells[0] {
-                let at = [i, j, k];
-                nodes.push(std::array::from_fn(|axis| {
-                    let offset = jitter * random.between(-1.0, 1.0);
-                    let is_inner = 0 < at[axis] && at[axis] < cells[axis];
-                    at[axis] as f64 + if is_inner { offset } else { 0.0 }
-                }));
-            }
-        }
-    }
-    // One tetrahedron for each order of walking along the axes; odd orders are inverted.
-    let walks = [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1], [1, 0, 2], [2, 1, 0]];
-    let mut tetrahedra = Vec::new();
-    for k in 0..cells[2] {
-        for j in 0..cells[1] {
-            for i in 0..cells[0] {
-                for (number, walk) in walks.iter().enumerate() {
-                    let mut at = [i, j, k];
-                    let mut corners = [index(at); 4];
-                    for (step, &axis) in walk.iter().enumerate() {
-                        at[axis] += 1;
-                        corners[step + 1] = index(at);
-                    }
-                    if number >= 3 {
-                        corners.swap(2, 3);
-                    }
-                    tetrahedra.push(corners);
-                }
-            }
-        }
-    }
+    let (nodes, tetrahedra) = box_of_cells(cells, Fastest::First, |at| {
+        std::array::from_fn(|axis| {
+            let offset = jitter * random.between(-1.0, 1.0);
+            let is_inner = 0.0 < at[axis] && at[axis] < cells[axis] as f64;
+            at[axis] + if is_inner { offset } else { 0.0 }
+        })
+    });
     let count = tetrahedra.len();
     let on_floor = |point: &Point| point[2] == 0.0;
     let floor = (0..).zip(&nodes).filter(|(_, point)| on_floor(point)).map(|(node, _)| node);

@@ -47,7 +47,7 @@ fn constant_strain_is_exact_on_a_distorted_mesh() {
 }
 
 /// Tip deflection of a beam held at x = 0 under a load at its end.
-fn tip_deflection(refinement: u32) -> f64 {
+fn tip_deflection(refinement: usize) -> f64 {
     let (l, h, young, force) = (1.0, 0.25, 1e6, 0.5);
     let n = refinement;
     let mesh = box_mesh([4 * n, n, n], [l, h, h], |x| x);

@@ -74,7 +74,7 @@ fn a_box_thrown_at_a_corner_gains_no_energy() {
     let tilt = DMat3::from_axis_angle(DVec3::new(1.0, 0.4, -0.3).normalize(), 0.9);
     for law in [Law::Corotated, Law::NeoHookean, Law::MooneyRivlin] {
         for (cells, speed) in [([2, 2, 3], 0.6), ([2, 2, 3], 1.5), ([3, 4, 5], 3.0)] {
-            let mesh = box_mesh(cells, cells.map(|n| 0.02 * f64::from(n)), |x| {
+            let mesh = box_mesh(cells, cells.map(|n| 0.02 * n as f64), |x| {
                 (tilt * DVec3::from_array(x) + DVec3::new(0.0, 0.0, 0.06)).to_array()
             });
             let mut thrown = soft("thrown", &mesh, 2e4, 0.0);

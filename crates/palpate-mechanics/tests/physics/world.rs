@@ -6,36 +6,15 @@ use palpate_contact::{IntersectionOptions, PenetratingNode, ProximityPair, Scene
 use palpate_geometry::Point;
 use palpate_mechanics::{Dynamics, DynamicsOptions, State, StepStats};
 use palpate_model::{Body, Material, Mesh, MeshChange, MeshData, Model, RigidMotion};
+use palpate_testing::{Fastest, box_of_cells};
 
 pub(crate) const GRAVITY: f64 = 9.81;
 
-/// Six tetrahedra per cell of a box with one corner at the origin; `map` places the nodes.
-pub(crate) fn box_mesh(cells: [u32; 3], size: Point, map: impl Fn(Point) -> Point) -> Arc<Mesh> {
-    let [nx, ny, nz] = cells.map(|n| n + 1);
-    let mut data = MeshData::default();
-    for k in 0..nz {
-        for j in 0..ny {
-            for i in 0..nx {
-                let at = [i, j, k];
-                let node =
-                    std::array::from_fn(|d| size[d] * f64::from(at[d]) / f64::from(cells[d]));
-                data.nodes.push(map(node));
-            }
-        }
-    }
-    for k in 0..cells[2] {
-        for j in 0..cells[1] {
-            for i in 0..cells[0] {
-                let corner = |bits: u32| {
-                    (i + (bits & 1)) + nx * ((j + (bits >> 1 & 1)) + ny * (k + (bits >> 2 & 1)))
-                };
-                for path in [[1, 3], [3, 2], [2, 6], [6, 4], [4, 5], [5, 1]] {
-                    data.tetrahedra.push([0, path[0], path[1], 7].map(corner));
-                }
-            }
-        }
-    }
-    Arc::new(Mesh::new(data).expect("a valid box"))
+/// A box of cells with one corner at the origin; `map` places the nodes.
+pub(crate) fn box_mesh(cells: [usize; 3], size: Point, map: impl Fn(Point) -> Point) -> Arc<Mesh> {
+    let place = |at: Point| map(std::array::from_fn(|d| size[d] * at[d] / cells[d] as f64));
+    let (nodes, tetrahedra) = box_of_cells(cells, Fastest::First, place);
+    Arc::new(Mesh::new(MeshData { nodes, tetrahedra, ..MeshData::default() }).expect("a valid box"))
 }
 
 /// A rectangle of two triangles at height `z`, facing up.

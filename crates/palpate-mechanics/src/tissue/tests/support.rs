@@ -2,6 +2,7 @@
 
 use glam::{DMat3, DQuat, DVec3};
 use palpate_geometry::Point;
+use palpate_testing::{Fastest, box_of_cells};
 use proptest::prelude::*;
 
 use super::super::law::{
@@ -79,29 +80,7 @@ pub(super) fn rotations() -> impl Strategy<Value = DMat3> {
 
 /// A block of `cells` cells of size `edge` [m], six tetrahedra each.
 pub(super) fn block(cells: [usize; 3], edge: f64) -> (Vec<Point>, Vec<[u32; 4]>) {
-    let nodes = cells.map(|count| count + 1);
-    let mut rest = Vec::new();
-    for k in 0..nodes[2] {
-        for j in 0..nodes[1] {
-            for i in 0..nodes[0] {
-                rest.push([i, j, k].map(|n| edge * n as f64));
-            }
-        }
-    }
-    let mut tetrahedra = Vec::new();
-    for k in 0..cells[2] {
-        for j in 0..cells[1] {
-            for i in 0..cells[0] {
-                let corner = |b: usize| {
-                    (i + (b & 1) + nodes[0] * (j + (b >> 1 & 1) + nodes[1] * (k + (b >> 2)))) as u32
-                };
-                for path in [[1, 3], [3, 2], [2, 6], [6, 4], [4, 5], [5, 1]] {
-                    tetrahedra.push([0, path[0], path[1], 7].map(corner));
-                }
-            }
-        }
-    }
-    (rest, tetrahedra)
+    box_of_cells(cells, Fastest::First, |at| at.map(|index| edge * index))
 }
 
 /// A body in two regions, the second one the tetrahedra with an odd index.

@@ -5,13 +5,16 @@
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// The system's allocator, counted.
-pub(crate) struct Counting;
+/// The system's allocator, counted: `#[global_allocator] static ALLOCATOR: Counting = Counting;`.
+#[derive(Debug)]
+pub struct Counting;
 
+static COUNT: AtomicUsize = AtomicUsize::new(0);
 static NOW: AtomicUsize = AtomicUsize::new(0);
 static PEAK: AtomicUsize = AtomicUsize::new(0);
 
 fn add(bytes: usize) {
+    COUNT.fetch_add(1, Ordering::Relaxed);
     let now = NOW.fetch_add(bytes, Ordering::Relaxed) + bytes;
     PEAK.fetch_max(now, Ordering::Relaxed);
 }
@@ -44,8 +47,14 @@ unsafe impl GlobalAlloc for Counting {
     }
 }
 
-/// The most bytes that were allocated at once during `action` beyond those before it.
-pub(crate) fn peak_of<T>(action: impl FnOnce() -> T) -> (T, usize) {
+/// Calls that asked for memory so far, of all threads.
+#[must_use]
+pub fn allocations() -> usize {
+    COUNT.load(Ordering::Relaxed)
+}
+
+/// The most bytes that were allocated at once during `action` beyond those before it, of all threads.
+pub fn peak_of<T>(action: impl FnOnce() -> T) -> (T, usize) {
     let before = NOW.load(Ordering::Relaxed);
     PEAK.store(before, Ordering::Relaxed);
     let result = action();
