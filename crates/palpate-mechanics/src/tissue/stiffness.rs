@@ -51,7 +51,9 @@ pub(super) fn places(
     }
     for (places, members) in places.iter_mut().zip(&layout.members) {
         for lane in (0..LANES).filter(|&lane| members[lane] == PADDING) {
-            places.iter_mut().for_each(|lanes| lanes[lane] = lanes[0]);
+            for lanes in places.iter_mut() {
+                lanes[lane] = lanes[0];
+            }
         }
     }
     places
