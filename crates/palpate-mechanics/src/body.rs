@@ -47,9 +47,6 @@ pub(crate) struct MovingBody {
     pub(crate) refactored: bool,
 }
 
-/// A step that begins again looks for pairs so many times farther away than the first try came.
-const WIDER: f64 = 1.2;
-
 /// How far the surface moves in the step that has begun.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Motion {
@@ -59,20 +56,6 @@ pub(crate) struct Motion {
     pub(crate) spread: f64,
     /// How much closer two nodes come to each other by the deformation, at most [m].
     pub(crate) deformation: f64,
-}
-
-impl Motion {
-    /// How much closer two surfaces come to each other at most [m].
-    pub(crate) fn approach(&self, other: &Self) -> f64 {
-        (self.mean - other.mean).length() + self.spread + other.spread
-    }
-
-    /// Takes in that the surface moves as `other` does as well.
-    pub(crate) fn widen(&mut self, other: &Self) {
-        let apart = (self.mean - other.mean).length();
-        self.spread = self.spread.max(other.spread + apart) * WIDER;
-        self.deformation = self.deformation.max(other.deformation) * WIDER;
-    }
 }
 
 pub(crate) enum BodyKind {
@@ -174,19 +157,15 @@ impl MovingBody {
                 }
             }
         }
-        // If contact forces stay as they are: without them a body at rest would look for contacts much
-        // too far away.
-        self.motion = self.motion_to(&self.expected_positions, surface, time_step);
+        self.motion = self.expected_motion(surface, time_step);
     }
 
-    /// How far the surface has moved in the step that is about to end.
-    pub(crate) fn moved(&self, surface: &[u32], time_step: f64) -> Motion {
-        self.motion_to(&self.next_positions, surface, time_step)
-    }
-
-    fn motion_to(&self, end: &[Point], surface: &[u32], time_step: f64) -> Motion {
+    /// How far the surface moves if contact forces stay as they are: without them a body at rest would
+    /// look for contacts much too far away.
+    fn expected_motion(&self, surface: &[u32], time_step: f64) -> Motion {
         let displacement = |&node: &u32| {
-            DVec3::from_array(end[node as usize]) - DVec3::from_array(self.positions[node as usize])
+            DVec3::from_array(self.expected_positions[node as usize])
+                - DVec3::from_array(self.positions[node as usize])
         };
         let mean = surface.iter().map(displacement).sum::<DVec3>() / surface.len().max(1) as f64;
         let spread = surface.iter().map(|node| (displacement(node) - mean).length());
@@ -271,21 +250,9 @@ impl MovingBody {
 
     /// Forgets what a step that failed has found out; contact forces are set by the caller.
     pub(crate) fn undo(&mut self) {
-        if let BodyKind::Elastic(elastic) = &mut self.kind
-            && elastic.undo()
-        {
-            self.compliance.clear();
+        if let BodyKind::Elastic(elastic) = &mut self.kind {
+            elastic.undo();
         }
-    }
-
-    /// Makes the matrix anew if the passes of the step diverge; the step must begin again then.
-    pub(crate) fn renew_if_diverging(&mut self) -> bool {
-        let BodyKind::Elastic(elastic) = &mut self.kind else { return false };
-        let changed = elastic.renew_if_diverging(&self.positions);
-        if changed {
-            self.compliance.clear();
-        }
-        changed
     }
 
     /// The first node whose next state is not finite.
@@ -343,14 +310,12 @@ impl MovingBody {
         }
         std::mem::swap(&mut self.positions, &mut self.next_positions);
         std::mem::swap(&mut self.velocities, &mut self.next_velocities);
-        self.refactored = false;
-        if let BodyKind::Elastic(elastic) = &mut self.kind {
-            let renewed = elastic.begin_next();
-            let refreshed = elastic.refresh_if_slow(&self.positions);
-            if refreshed {
-                self.compliance.clear();
-            }
-            self.refactored = renewed || refreshed;
+        self.refactored = match &mut self.kind {
+            BodyKind::Elastic(elastic) => elastic.refresh_if_slow(&self.positions),
+            BodyKind::Rigid(_) => false,
+        };
+        if self.refactored {
+            self.compliance.clear();
         }
     }
 }

@@ -17,7 +17,7 @@ use palpate_model::Model;
 use palpate_solver::FactorStats;
 use rayon::prelude::*;
 
-use crate::body::{BodyKind, Known, Motion, MovingBody, first_not_finite};
+use crate::body::{BodyKind, Known, MovingBody, first_not_finite};
 use crate::contact::filter::{BodyView, Candidate, Detected};
 use crate::contact::response::Response;
 use crate::contact::{Contact, ContactParameters, Surface};
@@ -329,43 +329,15 @@ impl Dynamics {
         if (a.rigid && b.rigid) || (body_a == body_b && !a.self_contact) {
             return None;
         }
-        let edge = a.soft_edge().min(b.soft_edge());
-        let margin = if body_a == body_b {
-            let deformation = self.body(body_a).motion.deformation;
-            (deformation + self.ties.drawn(body_a)).min(SELF_MARGIN_LIMIT * edge)
+        let (first, second) = (self.body(body_a).motion, self.body(body_b).motion);
+        let (margin, limit) = if body_a == body_b {
+            (first.deformation + self.ties.drawn(body_a), SELF_MARGIN_LIMIT)
         } else {
             let pulled = self.ties.moved(body_a) + self.ties.moved(body_b);
-            let approach = self.body(body_a).motion.approach(&self.body(body_b).motion);
-            (approach + pulled).min(MARGIN_LIMIT * edge)
+            let apart = (first.mean - second.mean).length();
+            (apart + first.spread + second.spread + pulled, MARGIN_LIMIT)
         };
-        Some(a.distance(b) + margin)
-    }
-
-    /// [`Dynamics::finish_step`] unless bodies that have an open surface near them moved farther than was
-    /// expected, and so than pairs were looked for: `None` then. The step has begun again, with a larger
-    /// [`Dynamics::search_distance`].
-    ///
-    /// # Errors
-    /// As [`Dynamics::finish_step`].
-    ///
-    /// # Panics
-    /// As [`Dynamics::finish_step`].
-    pub fn finish_step_if_covered(
-        &mut self,
-        proximity: &[ProximityPair],
-        penetration: &[PenetratingNode],
-    ) -> Result<Option<StepStats>, MechanicsError> {
-        let mut response = std::mem::take(&mut self.response);
-        let detected = Detected { proximity, penetration };
-        let mut stats = StepStats::default();
-        self.solve_step(&mut response, detected, &mut stats);
-        let result = if self.widen(&mut response) {
-            Ok(None)
-        } else {
-            self.end_step(&mut response, stats).map(Some)
-        };
-        self.response = response;
-        result
+        Some(a.distance(b) + margin.min(limit * a.soft_edge().min(b.soft_edge())))
     }
 
     /// Solves for the contact forces and moves the bodies to the end of the step.
@@ -385,65 +357,52 @@ impl Dynamics {
         penetration: &[PenetratingNode],
     ) -> Result<StepStats, MechanicsError> {
         let mut response = std::mem::take(&mut self.response);
-        let detected = Detected { proximity, penetration };
-        let mut stats = StepStats::default();
-        self.solve_step(&mut response, detected, &mut stats);
-        let result = self.end_step(&mut response, stats);
+        let result = self.finish_with(&mut response, proximity, penetration);
         self.response = response;
         result
     }
 
-    /// Finds the contact forces and where the bodies go.
-    fn solve_step(
+    fn finish_with(
         &mut self,
         response: &mut Response,
-        detected: Detected<'_>,
-        stats: &mut StepStats,
-    ) {
-        response.begin(|candidates| self.add_ties(candidates));
-        while self.pass_by_pass(response, detected, stats) {
-            self.set_contact_forces(response.last().forces());
-            self.begin_part(self.part);
-            response.restart(|candidates| self.add_ties(candidates));
-        }
-    }
-
-    /// Begins the step again if a body came closer to an open surface than was looked for pairs, and true
-    /// then: what goes through such a surface in one step is behind it. Deep inside a closed one it is found.
-    fn widen(&mut self, response: &mut Response) -> bool {
-        let open: Vec<usize> =
-            (0..self.body_count()).filter(|&body| !self.surfaces[body].is_closed()).collect();
-        if open.is_empty() {
-            return false;
-        }
-        let time_step = self.options.time_step;
-        let moved: Vec<Motion> = (0..self.body_count())
-            .map(|body| {
-                self.body(body).moved(self.surfaces[body].mesh().surface_nodes(), time_step)
-            })
-            .collect();
-        let is_short = |a: usize, b: usize| {
-            let edge = self.parameters[a].soft_edge().min(self.parameters[b].soft_edge());
-            let searched = self.search_distance(a, b);
-            searched.is_some_and(|d| moved[a].approach(&moved[b]).min(MARGIN_LIMIT * edge) > d)
-        };
-        if !open.iter().any(|&b| (0..self.body_count()).any(|a| a != b && is_short(a, b))) {
-            return false;
-        }
-        response.undo();
-        self.set_contact_forces(response.last().forces());
-        self.begin_part(self.part);
-        for (body, moved) in moved.iter().enumerate() {
-            self.body_mut(body).motion.widen(moved);
-        }
-        true
-    }
-
-    fn end_step(
-        &mut self,
-        response: &mut Response,
-        mut stats: StepStats,
+        proximity: &[ProximityPair],
+        penetration: &[PenetratingNode],
     ) -> Result<StepStats, MechanicsError> {
+        let mut stats = StepStats::default();
+        stats.times.predict = self.predict_time;
+        let time_step = self.options.time_step;
+
+        let start = Instant::now();
+        response.begin(|candidates| self.add_ties(candidates));
+        response.find(
+            Detected { proximity, penetration },
+            self.body_count(),
+            time_step,
+            self.threads.pool(),
+            |body| self.body(body),
+            |body| BodyView {
+                surface: &self.surfaces[body],
+                parameters: &self.parameters[body],
+                positions: &self.body(body).positions,
+            },
+        );
+        stats.times.filter = start.elapsed();
+
+        for pass in 1..=MAX_PASSES {
+            self.solve_contacts(response, &mut stats);
+            let start = Instant::now();
+            self.set_contact_forces(response.forces());
+            self.for_each_body(|_, body| body.advance(time_step));
+            let missed = response.take_missed(|body| self.body(body));
+            let again = pass < MAX_PASSES && (self.improve() || missed);
+            if again {
+                response.begin_again(self.body_count(), |body| self.body(body));
+            }
+            stats.times.advance += start.elapsed();
+            if !again {
+                break;
+            }
+        }
         stats.candidates = response.candidate_count();
         stats.contacts = response.contacts().len();
         stats.self_contacts =
@@ -456,7 +415,7 @@ impl Dynamics {
         stats.newton_iterations = iterations.max().unwrap_or(0) as usize;
         let start = Instant::now();
         self.for_each_body(|_, body| body.commit());
-        stats.times.refactor += start.elapsed();
+        stats.times.refactor = start.elapsed();
         let refactored = (0..self.body_count()).filter(|&body| self.body(body).refactored);
         stats.refactored = refactored.count();
         response.remember();
@@ -464,64 +423,6 @@ impl Dynamics {
         self.finish_drives();
         self.step += 1;
         Ok(stats)
-    }
-
-    /// Solves for the contact forces and the response of the bodies in turn; true if the step must begin again
-    /// with other matrices.
-    fn pass_by_pass(
-        &mut self,
-        response: &mut Response,
-        detected: Detected<'_>,
-        stats: &mut StepStats,
-    ) -> bool {
-        stats.times.predict += self.predict_time;
-        let time_step = self.options.time_step;
-        let start = Instant::now();
-        response.find(
-            detected,
-            self.body_count(),
-            time_step,
-            self.threads.pool(),
-            |body| self.body(body),
-            |body| BodyView {
-                surface: &self.surfaces[body],
-                parameters: &self.parameters[body],
-                positions: &self.body(body).positions,
-            },
-        );
-        stats.times.filter += start.elapsed();
-
-        for pass in 1..=MAX_PASSES {
-            self.solve_contacts(response, stats);
-            let start = Instant::now();
-            self.set_contact_forces(response.forces());
-            self.for_each_body(|_, body| body.advance(time_step));
-            let missed = response.take_missed(|body| self.body(body));
-            let again = pass < MAX_PASSES && (self.improve() || missed);
-            stats.times.advance += start.elapsed();
-            if !again {
-                break;
-            }
-            let start = Instant::now();
-            let renewed = self.renew_diverging();
-            stats.times.refactor += start.elapsed();
-            if renewed {
-                return true;
-            }
-            let start = Instant::now();
-            response.begin_again(self.body_count(), |body| self.body(body));
-            stats.times.advance += start.elapsed();
-        }
-        false
-    }
-
-    /// Makes the matrices anew of bodies that go ever farther from pass to pass; true if there are any.
-    fn renew_diverging(&mut self) -> bool {
-        let renewed = AtomicUsize::new(0);
-        self.for_each_body(|_, body| {
-            renewed.fetch_add(usize::from(body.renew_if_diverging()), Ordering::Relaxed);
-        });
-        renewed.into_inner() > 0
     }
 
     /// Goes back to before the step that has begun.

@@ -174,9 +174,6 @@ pub struct StepReport {
     pub mechanics: StepStats,
 }
 
-/// Searches for close pairs in one step at most: a body may go farther than it was expected to.
-const MOST_SEARCHES: usize = 3;
-
 /// What contacts are made of.
 pub(crate) const CONTACT_PAIRS: ProximityOptions =
     ProximityOptions { close_at_rest: true, each_feature_once: true };
@@ -276,27 +273,15 @@ impl Simulation {
         penetration.clone_from(&self.scene.penetration(&deformable_pair).nodes);
         times.penetration = begin.elapsed();
 
-        let mut tries = 0;
-        let (mechanics, proximity_pairs) = loop {
-            let begin = Instant::now();
-            let dynamics = &self.dynamics;
-            let proximity =
-                self.scene.proximity_with(&|a, b| dynamics.search_distance(a, b), &CONTACT_PAIRS);
-            times.proximity += begin.elapsed();
+        let begin = Instant::now();
+        let proximity =
+            self.scene.proximity_with(&|a, b| dynamics.search_distance(a, b), &CONTACT_PAIRS);
+        times.proximity = begin.elapsed();
 
-            let begin = Instant::now();
-            tries += 1;
-            let pairs = &proximity.pairs;
-            let done = if tries < MOST_SEARCHES {
-                self.dynamics.finish_step_if_covered(pairs, penetration)?
-            } else {
-                Some(self.dynamics.finish_step(pairs, penetration)?)
-            };
-            times.mechanics += begin.elapsed();
-            if let Some(stats) = done {
-                break (stats, pairs.len());
-            }
-        };
+        let begin = Instant::now();
+        let proximity_pairs = proximity.pairs.len();
+        let mechanics = self.dynamics.finish_step(&proximity.pairs, penetration)?;
+        times.mechanics += begin.elapsed();
         times.total = start.elapsed();
         Ok(StepReport {
             step: self.dynamics.step_count(),

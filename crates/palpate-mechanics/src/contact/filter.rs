@@ -110,15 +110,6 @@ impl BodyView<'_> {
     }
 }
 
-/// What the filter asks about the step before.
-pub(crate) trait LastStep: Sync {
-    /// Whether a pair carried a force.
-    fn holds(&self, pair: &ProximityPair) -> bool;
-
-    /// Force on a node by the triangles of a body [N].
-    fn on_node(&self, bodies: [u32; 2], node: u32) -> DVec3;
-}
-
 /// Finds the contact candidates of a step. Keeps its memory.
 #[derive(Debug, Default)]
 pub(crate) struct Filter {
@@ -139,12 +130,12 @@ impl Filter {
     }
 
     /// Adds the contact candidates of this step, in the order of the pairs, then of the penetrations.
-    /// `last` are the forces of the last step.
+    /// `is_loaded` tells which pairs carried a force in the last step.
     pub(crate) fn run<'a>(
         &mut self,
         Detected { proximity, penetration }: Detected<'_>,
         view: impl Fn(u32) -> BodyView<'a> + Sync,
-        last: &impl LastStep,
+        is_loaded: impl Fn(&ProximityPair) -> bool + Sync,
         time_step: f64,
         pool: Option<&rayon::ThreadPool>,
         candidates: &mut Vec<Candidate>,
@@ -157,7 +148,7 @@ impl Filter {
         found.resize_with(count.max(found.len()), Vec::new);
         let test = |(pairs, found): (&[ProximityPair], &mut Vec<Candidate>)| {
             found.clear();
-            let candidate = |pair| self.test(pair, &view, last, time_step);
+            let candidate = |pair| self.test(pair, &view, &is_loaded, time_step);
             found.extend(pairs.iter().filter_map(candidate));
         };
         let found_by = &mut found[..count];
@@ -202,7 +193,7 @@ impl Filter {
         &self,
         pair: &ProximityPair,
         view: impl Fn(u32) -> BodyView<'a>,
-        last: &impl LastStep,
+        is_loaded: impl Fn(&ProximityPair) -> bool,
         time_step: f64,
     ) -> Option<Candidate> {
         let bodies = pair.bodies.map(view);
@@ -210,8 +201,8 @@ impl Filter {
             return None;
         }
         let Meeting { gap, normal, offset } = match pair.kind {
-            PairKind::VertexTriangle => self.vertex_triangle(pair, bodies, last),
-            PairKind::EdgeEdge => edge_edge(pair, bodies, last.holds(pair)),
+            PairKind::VertexTriangle => self.vertex_triangle(pair, bodies),
+            PairKind::EdgeEdge => edge_edge(pair, bodies, is_loaded(pair)),
         }?;
         let area = match pair.kind {
             PairKind::VertexTriangle => bodies[0].surface.node_area(pair.nodes[0]),
@@ -268,7 +259,6 @@ impl Filter {
         &self,
         pair: &ProximityPair,
         [own, other]: [BodyView<'_>; 2],
-        last: &impl LastStep,
     ) -> Option<Meeting> {
         let key = (pair.bodies[0], pair.nodes[0], pair.bodies[1]);
         if self.inside.binary_search(&key).is_ok() {
@@ -326,10 +316,6 @@ impl Filter {
         }
         if behind {
             return None;
-        }
-        if !other.surface.is_closed() && last.on_node(pair.bodies, node).dot(normal) < 0.0 {
-            // Through an open surface that pushed it the other way before.
-            return Some(Meeting { gap: -gap, normal: -normal, offset: 0.0 });
         }
         let faces_away = own.surface.is_closed()
             && own.surface.node_normal(node, own.positions).dot(normal) > FACING_LIMIT;
@@ -475,18 +461,6 @@ mod tests {
         Body::new("roof", Arc::new(Mesh::new(data).unwrap()))
     }
 
-    struct Loaded(bool);
-
-    impl LastStep for Loaded {
-        fn holds(&self, _: &ProximityPair) -> bool {
-            self.0
-        }
-
-        fn on_node(&self, _: [u32; 2], _: u32) -> DVec3 {
-            DVec3::ZERO
-        }
-    }
-
     /// Whether two roofs with a slope of `slope` touch with their edges, crosswise.
     fn edges_touch(slope: f64, is_loaded: bool) -> bool {
         let below =
@@ -522,7 +496,7 @@ mod tests {
         Filter::default().run(
             Detected { proximity: &[pair], penetration: &[] },
             view,
-            &Loaded(is_loaded),
+            |_| is_loaded,
             0.01,
             None,
             &mut candidates,

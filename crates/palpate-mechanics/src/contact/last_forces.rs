@@ -1,9 +1,8 @@
 //! The contact forces of the last step: where the next solve begins and what motion to expect.
 
-use glam::DVec3;
 use palpate_contact::{PairKind, ProximityPair};
 
-use super::filter::{Candidate, LastStep};
+use super::filter::Candidate;
 use crate::state::ContactForce;
 
 /// Contact forces by what touches. Keeps its memory.
@@ -55,24 +54,15 @@ impl LastForces {
         place.map(|place| &self.forces[place])
     }
 
+    /// Whether a pair touched.
+    pub(crate) fn holds(&self, pair: &ProximityPair) -> bool {
+        self.find(pair.kind, pair.bodies, pair.nodes).is_some()
+    }
+
     fn find(&self, kind: PairKind, bodies: [u32; 2], nodes: [u32; 4]) -> Option<usize> {
         let wanted = (kind == PairKind::EdgeEdge, bodies, nodes);
         let place =
             self.order.binary_search_by_key(&wanted, |&place| key(&self.forces[place as usize]));
         place.ok().map(|place| self.order[place] as usize)
-    }
-}
-
-impl LastStep for LastForces {
-    fn holds(&self, pair: &ProximityPair) -> bool {
-        self.find(pair.kind, pair.bodies, pair.nodes).is_some()
-    }
-
-    fn on_node(&self, bodies: [u32; 2], node: u32) -> DVec3 {
-        let first = (false, bodies, [node, 0, 0, 0]);
-        let begin = self.order.partition_point(|&place| key(&self.forces[place as usize]) < first);
-        let forces = self.order[begin..].iter().map(|&place| &self.forces[place as usize]);
-        let on_it = |f: &&ContactForce| !f.edges && f.bodies == bodies && f.nodes[0] == node;
-        forces.take_while(on_it).map(|f| DVec3::from_array(f.force)).sum()
     }
 }

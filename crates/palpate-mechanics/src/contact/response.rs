@@ -1,7 +1,7 @@
 //! The contact stage of a step: candidates, forces, and the contacts that are reported.
 
 use glam::DVec3;
-use palpate_contact::PairKind;
+use palpate_contact::{PairKind, ProximityPair};
 
 use super::Contact;
 use super::filter::{BodyView, Candidate, Detected, Filter};
@@ -49,13 +49,6 @@ impl Response {
 
     /// Begins a step with the ties that `add` writes.
     pub(crate) fn begin(&mut self, add: impl FnOnce(&mut Vec<Candidate>)) {
-        std::mem::swap(&mut self.contacts, &mut self.contacts_before);
-        self.restart(add);
-    }
-
-    /// Begins the step that is under way once more.
-    pub(crate) fn restart(&mut self, add: impl FnOnce(&mut Vec<Candidate>)) {
-        self.contacts.clear();
         self.candidates.clear();
         add(&mut self.candidates);
         self.ties = self.candidates.len();
@@ -73,7 +66,8 @@ impl Response {
     ) {
         let view = |body: u32| view(body as usize);
         let (last, candidates) = (&self.last, &mut self.candidates);
-        self.filter.run(detected, view, last, time_step, pool, candidates);
+        let is_loaded = |pair: &ProximityPair| last.holds(pair);
+        self.filter.run(detected, view, is_loaded, time_step, pool, candidates);
         self.spare.clear();
         let spare = &mut self.spare;
         self.candidates.retain(|candidate| {
@@ -91,6 +85,8 @@ impl Response {
         });
         self.guess.clone_from(&self.last);
         self.problem.collect(&self.candidates, body_count, &body);
+        std::mem::swap(&mut self.contacts, &mut self.contacts_before);
+        self.contacts.clear();
     }
 
     /// Takes in the pairs that the step brought together although it was not expected; true if

@@ -10,7 +10,7 @@ use palpate_contact::{PairKind, PenetratingNode, ProximityPair};
 use palpate_geometry::Point;
 use palpate_model::Model;
 
-use super::filter::{BodyView, Candidate, Detected, Filter, LastStep};
+use super::filter::{BodyView, Candidate, Detected, Filter};
 use super::law::Law;
 use super::problem::{Block, principal_axes};
 use super::{Contact, ContactParameters, Patch, Surface, side};
@@ -70,23 +70,6 @@ pub struct Touch {
     published: Vec<f32>,
     before: Vec<f32>,
     moved: Vec<f32>,
-}
-
-impl LastStep for Vec<Remembered> {
-    fn holds(&self, pair: &ProximityPair) -> bool {
-        let key = (pair.kind == PairKind::EdgeEdge, pair.bodies, pair.nodes);
-        self.binary_search_by_key(&key, |contact| contact.key).is_ok()
-    }
-
-    fn on_node(&self, bodies: [u32; 2], node: u32) -> DVec3 {
-        let first = (false, bodies, [node, 0, 0, 0]);
-        let begin = self.partition_point(|contact| contact.key < first);
-        let on_it = |contact: &&Remembered| {
-            let (edges, sides, nodes) = contact.key;
-            !edges && sides == bodies && nodes[0] == node
-        };
-        self[begin..].iter().take_while(on_it).map(|contact| contact.force).sum()
-    }
 }
 
 impl Touch {
@@ -208,11 +191,15 @@ impl Touch {
             parameters: &parameters[body as usize],
             positions: positions[body as usize],
         };
+        let is_loaded = |pair: &ProximityPair| {
+            let key = (pair.kind == PairKind::EdgeEdge, pair.bodies, pair.nodes);
+            last.binary_search_by_key(&key, |contact| contact.key).is_ok()
+        };
         candidates.clear();
         filter.run(
             Detected { proximity, penetration },
             view,
-            last,
+            is_loaded,
             self.time_step,
             None,
             candidates,

@@ -35,8 +35,6 @@ const SLOW: u32 = 6;
 /// The same when a node has moved by more than this part of the body's radius since, apart from the
 /// body's motion as a whole: slow processes need few iterations in each of very many steps.
 const DEFORMED: f64 = 0.1;
-/// So often in turn the moves between solves for the contact forces grow before a step begins again.
-const DIVERGING: u32 = 2;
 /// A move went too far when the residual along it has turned round and is more than this part of what it was;
 /// it is shortened so many times at most, and not below this part of it at a time.
 const OVERSHOT: f64 = 0.5;
@@ -77,10 +75,6 @@ pub(super) struct QuasiNewton {
     effort: u32,
     /// Longest move of the last iteration [m].
     longest: f64,
-    /// The same or the response to contact, the longer one, between the last solves for the contact
-    /// forces [m], and how often in turn it has grown.
-    change: f64,
-    grown: u32,
 }
 
 /// A move s of the free nodes and the change y of the residual, its sign turned.
@@ -119,8 +113,6 @@ impl QuasiNewton {
             passes: 0,
             effort: 0,
             longest: 0.0,
-            change: f64::INFINITY,
-            grown: 0,
         }
     }
 
@@ -229,7 +221,14 @@ impl ElasticBody {
         match std::mem::take(&mut self.elasticity) {
             Elasticity::Nonlinear(mut method) => {
                 let due = method.effort >= SLOW || self.is_deformed(&method, x);
-                let changed = due && self.take_stiffness_at(&mut method, x);
+                let changed = due && {
+                    method.x.clear();
+                    method.x.extend(self.arms_of(x).map(|arm| arm.to_array()));
+                    let shape = std::mem::take(&mut method.x);
+                    let changed = self.take_stiffness(&mut method, &shape);
+                    method.x = shape;
+                    changed
+                };
                 self.elasticity = Elasticity::Nonlinear(method);
                 changed
             }
@@ -238,24 +237,6 @@ impl ElasticBody {
                 false
             }
         }
-    }
-
-    /// Makes A of the shape at positions `x`, where the step begins, if the body goes ever farther from one solve
-    /// for the contact forces to the next: A says far too little about how stiff it is by now. Only once
-    /// in a step; true if A has changed.
-    pub(in crate::body) fn renew_if_diverging(&mut self, x: &[Point]) -> bool {
-        let due = |method: &QuasiNewton| method.grown >= DIVERGING && !self.step.before.was_renewed;
-        if !matches!(&self.elasticity, Elasticity::Nonlinear(method) if due(method)) {
-            return false;
-        }
-        let Elasticity::Nonlinear(mut method) = std::mem::take(&mut self.elasticity) else {
-            return false;
-        };
-        self.step.before.renew(&method.stiff_shape);
-        self.step.keep_turning();
-        let changed = self.take_stiffness_at(&mut method, x);
-        self.elasticity = Elasticity::Nonlinear(method);
-        changed
     }
 
     /// Whether positions `x` differ much in shape from those that A is made of.
@@ -267,16 +248,6 @@ impl ElasticBody {
             largest_change(self.arms_of(x), shape)
         };
         change > DEFORMED
-    }
-
-    /// Makes A of the stiffness at positions `x`; true if A has changed.
-    fn take_stiffness_at(&mut self, method: &mut QuasiNewton, x: &[Point]) -> bool {
-        let mut shape = std::mem::take(&mut method.x);
-        shape.clear();
-        shape.extend(self.arms_of(x).map(|arm| arm.to_array()));
-        let changed = self.take_stiffness(method, &shape);
-        method.x = shape;
-        changed
     }
 
     /// Makes A of the stiffness of a shape ([`QuasiNewton::system_at`]); true if A has changed.
@@ -308,7 +279,6 @@ impl ElasticBody {
         self.begin_correction(method.mean_edge);
         method.iterations = 0;
         (method.effort, method.passes) = (0, 1);
-        (method.change, method.grown) = (f64::INFINITY, 0);
         self.relax(method, forces, contact);
         if self.is_unattached() {
             self.put_momentum_right(x, forces, contact);
@@ -418,12 +388,9 @@ impl ElasticBody {
         let enough = SETTLED * method.mean_edge;
         let squares = self.step.response.iter().map(|r| DVec3::from_array(*r).length_squared());
         let response = squares.fold(0.0, f64::max).sqrt();
-        let change = method.longest.max(response);
-        if change <= enough {
+        if method.longest.max(response) <= enough {
             return false;
         }
-        method.grown = if change > method.change { method.grown + 1 } else { 0 };
-        method.change = change;
         for (d, r) in self.step.correction.iter_mut().zip(&mut self.step.response) {
             *d = std::array::from_fn(|k| d[k] + r[k]);
             *r = [0.0; 3];

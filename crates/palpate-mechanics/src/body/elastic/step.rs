@@ -39,7 +39,7 @@ pub(super) struct Step {
     /// How contact forces turn the body: known once it has been touched in about this shape.
     pub(super) turning: Turning,
     pub(super) turning_known: bool,
-    pub(super) before: Before,
+    before: TurningBefore,
     /// Whether contact forces act in this step.
     touched: bool,
     pub(super) workspace: SolveWorkspace,
@@ -47,25 +47,13 @@ pub(super) struct Step {
     pub(super) places: Vec<u32>,
 }
 
-/// What was known before the step, should it fail.
+/// What was known of the turning before the step, should it fail.
 #[derive(Default)]
-pub(super) struct Before {
+struct TurningBefore {
     was_known: bool,
-    /// Whether the step has made the turning anew; it is here then.
+    /// Whether the step has made it anew; it is here then.
     was_made: bool,
     turning: Turning,
-    /// Whether the step has made A anew and begun again; the shape that it was made of is here then.
-    pub(super) was_renewed: bool,
-    stiff_shape: Vec<Point>,
-}
-
-impl Before {
-    /// Keeps the shape that A was made of: it will be that of another.
-    pub(super) fn renew(&mut self, stiff_shape: &[Point]) {
-        self.was_renewed = true;
-        self.stiff_shape.clear();
-        self.stiff_shape.extend_from_slice(stiff_shape);
-    }
 }
 
 impl Step {
@@ -91,7 +79,7 @@ impl Step {
             turns: false,
             turning: Turning::default(),
             turning_known: false,
-            before: Before::default(),
+            before: TurningBefore::default(),
             touched: false,
             workspace,
             places: Vec::new(),
@@ -100,14 +88,6 @@ impl Step {
 }
 
 impl Step {
-    /// Keeps what is known of the turning, which will be made anew.
-    pub(super) fn keep_turning(&mut self) {
-        if !self.before.was_made {
-            std::mem::swap(&mut self.turning, &mut self.before.turning);
-            self.before.was_made = true;
-        }
-    }
-
     pub(super) fn center(&self) -> DVec3 {
         self.center
     }
@@ -146,10 +126,8 @@ impl ElasticBody {
         part: f64,
     ) {
         let dt = self.time_step;
-        if !self.step.before.was_renewed {
-            self.step.before.was_known = self.step.turning_known;
-            self.step.before.was_made = false;
-        }
+        self.step.before.was_known = self.step.turning_known;
+        self.step.before.was_made = false;
         self.step.start = Inertia::new(&self.masses, x, v);
         if self.is_unattached() {
             self.predict_rigidly(x, v);
@@ -260,32 +238,22 @@ impl ElasticBody {
         if !self.is_unattached() || self.step.turning_known {
             return;
         }
-        self.step.keep_turning();
+        if !self.step.before.was_made {
+            std::mem::swap(&mut self.step.turning, &mut self.step.before.turning);
+            self.step.before.was_made = true;
+        }
         let rotations = std::mem::take(&mut self.step.rotations);
         self.turn_by(rotations.arms().iter().copied());
         self.step.rotations = rotations;
     }
 
-    /// Forgets what a step that failed has found out; true if A has changed.
-    pub(in crate::body) fn undo(&mut self) -> bool {
-        let renewed = self.begin_next();
-        if renewed && let Elasticity::Nonlinear(mut method) = std::mem::take(&mut self.elasticity) {
-            let shape = std::mem::take(&mut self.step.before.stiff_shape);
-            self.take_stiffness(&mut method, &shape);
-            self.step.before.stiff_shape = shape;
-            self.elasticity = Elasticity::Nonlinear(method);
-        }
+    /// Forgets what a step that failed has found out.
+    pub(in crate::body) fn undo(&mut self) {
         let Step { turning, turning_known, before, .. } = &mut self.step;
         if std::mem::take(&mut before.was_made) {
             std::mem::swap(turning, &mut before.turning);
         }
         *turning_known = before.was_known;
-        renewed
-    }
-
-    /// Whether this step had A made anew; the next one may do so again.
-    pub(in crate::body) fn begin_next(&mut self) -> bool {
-        std::mem::take(&mut self.step.before.was_renewed)
     }
 
     /// Finds out how contact forces turn the body in the shape that `arms` give.
