@@ -1,5 +1,7 @@
 """Models: from text and from Python."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from conftest import CUBE_NODES, CUBE_TETRAHEDRA
@@ -56,6 +58,23 @@ def test_text_round_trips(write_model):
     again = palpate.read_model(write_model(model.to_text()))
     assert again.to_text() == model.to_text()
     assert [body.mesh for body in again.bodies] == [body.mesh for body in model.bodies]
+
+
+def test_every_parameter_of_a_material_goes_by_its_name(write_model):
+    numbers = {each.name: each.default for each in dataclasses.fields(palpate.Material)}
+    numbers = {name: value for name, value in numbers.items() if isinstance(value, float)}
+    assert len(numbers) >= 9
+    numbers = {name: 0.01 * (place + 1) for place, name in enumerate(numbers)}
+    text = " ".join(f"{name} {value}" for name, value in numbers.items())
+    model = palpate.read_model(
+        write_model(f"TREE {{ NE kidney.seg  MT {{ law corotated {text} }} }}")
+    )
+    (body,) = model.bodies
+    assert body.material == palpate.Material(law="corotated", **numbers)
+    assert palpate.Model([body]).bodies[0].material == body.material
+    assert palpate.read_model(write_model("TREE { NE kidney.seg }")).bodies[0].material == (
+        palpate.Material()
+    )
 
 
 def test_extensions_arrive_in_python(write_model):

@@ -12,20 +12,7 @@ _Int64 = npt.NDArray[np.int64]
 _Index = npt.NDArray[np.int32]
 _Vec3 = tuple[float, float, float]
 _Quaternion = tuple[float, float, float, float]
-_Material = tuple[
-    str,
-    float,
-    float,
-    float,
-    float,
-    float,
-    float,
-    float,
-    float,
-    float,
-    _Vec3 | None,
-    _Vec3 | None,
-]
+_Material = tuple[str, list[float], _Vec3 | None, _Vec3 | None]
 _Contact = tuple[float, float | None, float | None, bool]
 _Key = tuple[float, _Vec3, _Quaternion]
 _CutOptions = tuple[float | None, float | None, float | None, float | None]

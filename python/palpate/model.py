@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -47,24 +47,23 @@ class Material:
     fibre: tuple[float, float, float] | None = None
     fibre_2: tuple[float, float, float] | None = None
 
-    def _row(self, name: str) -> _core._Material:
-        def number(value: Any, what: str) -> float:
-            return _arrays.number(value, f"{name}: {what}")
+    @classmethod
+    def _of(cls, row: _core._Material) -> Material:
+        law, values, fibre, fibre_2 = row
+        numbers: dict[str, Any] = dict(zip(_PARAMETERS, values, strict=True))
+        return cls(law, fibre=fibre, fibre_2=fibre_2, **numbers)
 
+    def _row(self, name: str) -> _core._Material:
         return (
             _arrays.instance(self.law, f"{name}: law", str),
-            number(self.young, "young"),
-            number(self.poisson, "poisson"),
-            number(self.density, "density"),
-            number(self.damping, "damping"),
-            number(self.mass_damping, "mass_damping"),
-            number(self.mooney, "mooney"),
-            number(self.k1, "k1"),
-            number(self.k2, "k2"),
-            number(self.kappa, "kappa"),
+            [_arrays.number(getattr(self, each), f"{name}: {each}") for each in _PARAMETERS],
             None if self.fibre is None else _arrays.vector(self.fibre, f"{name}: fibre"),
             None if self.fibre_2 is None else _arrays.vector(self.fibre_2, f"{name}: fibre_2"),
         )
+
+
+#: The numbers among the fields of `Material`, in the order of the core.
+_PARAMETERS = tuple(each.name for each in fields(Material))[1:-2]
 
 
 @dataclass(frozen=True)
@@ -170,8 +169,8 @@ class Body:
         return cls(
             mesh=Mesh._from_core(core.mesh),
             name=core.name,
-            material=Material(*core.material),
-            regions={region: Material(*row) for region, row in core.regions.items()},
+            material=Material._of(core.material),
+            regions={region: Material._of(row) for region, row in core.regions.items()},
             fixed_nodes=core.fixed_nodes,
             rigid=None if keys is None else tuple(RigidKey(*key) for key in keys),
             contact=Contact(*core.contact),

@@ -18,7 +18,7 @@ use crate::language::Document;
 use crate::mesh::Mesh;
 
 pub use attachment::{AttachedNode, Attachment, AttachmentError, triangle_axes};
-pub use material::{Law, Material};
+pub use material::{Law, Material, MaterialEntries, Parameter, Range};
 pub use pose::{Pose, PoseParts};
 pub use structure::Structure;
 pub use validate::BodyError;

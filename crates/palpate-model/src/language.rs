@@ -12,10 +12,10 @@ mod near;
 mod parser;
 mod text;
 
+pub use crate::body::MaterialEntries;
 pub use diagnostic::{Diagnostic, ModelError, Span};
 pub use document::{
     AppearanceEntries, AttachmentEntries, Block, Branch, ContactEntries, Document, Fixed,
-    FixedRegion, MaterialEntries, PathKey, RegionEntries, Rotation, Settings, Transform, Tree,
-    Unit,
+    FixedRegion, PathKey, RegionEntries, Rotation, Settings, Transform, Tree, Unit,
 };
 pub use load::{CoreLoader, LoadError, MeshLoader, load_model};

@@ -8,7 +8,8 @@ mod number;
 
 pub use body::{
     Appearance, AttachedNode, Attachment, AttachmentError, Body, BodyError, ContactSettings, Law,
-    Material, Model, Pose, PoseParts, RigidKey, RigidMotion, Structure, triangle_axes,
+    Material, Model, Parameter, Pose, PoseParts, Range, RigidKey, RigidMotion, Structure,
+    triangle_axes,
 };
 pub use files::{
     FileError, FileErrorCause, MESH_EXTENSIONS, ReadMesh, ReadOptions, read_mesh, write_mesh,

@@ -21,8 +21,8 @@ use crate::mesh::PyMesh;
 
 type Vec3 = (f64, f64, f64);
 type Quaternion = (f64, f64, f64, f64);
-type MaterialRow =
-    (String, f64, f64, f64, f64, f64, f64, f64, f64, f64, Option<Vec3>, Option<Vec3>);
+/// Law, parameters in their order, fibres.
+type MaterialRow = (String, [f64; Material::PARAMETERS.len()], Option<Vec3>, Option<Vec3>);
 type ContactRow = (f64, Option<f64>, Option<f64>, bool);
 type KeyRow = (f64, Vec3, Quaternion);
 type AttachmentRow = (usize, usize, Option<f64>, Option<f64>);
@@ -164,40 +164,14 @@ impl PyBody {
 }
 
 fn material_from_row(row: MaterialRow) -> Result<Material, BodyError> {
-    let (law, young, poisson, density, damping, mass_damping, mooney, k1, k2, kappa, a, b) = row;
+    let (law, values, a, b) = row;
     let (law, fibres) = (law.parse()?, [a, b].map(|fibre| fibre.map(Into::into)));
-    Ok(Material {
-        law,
-        young,
-        poisson,
-        density,
-        damping,
-        mass_damping,
-        mooney,
-        k1,
-        k2,
-        kappa,
-        fibres,
-    })
+    Ok(Material { law, fibres, ..Material::default() }.with_values(values))
 }
 
 fn material_row(m: &Material) -> MaterialRow {
     let [a, b] = m.fibres.map(|fibre| fibre.map(Into::into));
-    let law = m.law.to_string();
-    (
-        law,
-        m.young,
-        m.poisson,
-        m.density,
-        m.damping,
-        m.mass_damping,
-        m.mooney,
-        m.k1,
-        m.k2,
-        m.kappa,
-        a,
-        b,
-    )
+    (m.law.to_string(), m.values(), a, b)
 }
 
 fn invalid(body: &Body, error: &dyn std::fmt::Display) -> PyErr {

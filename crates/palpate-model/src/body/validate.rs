@@ -88,18 +88,10 @@ impl Body {
         let finite = |entry, value| check(entry, value, true, "finite");
 
         for material in iter::once(&self.material).chain(self.regions.iter().map(|(_, m)| m)) {
-            positive("young", material.young)?;
-            let poisson = material.poisson;
-            let valid = -1.0 < poisson && poisson < 0.5;
-            check("poisson", poisson, valid, "greater than -1 and less than 0.5")?;
-            positive("density", material.density)?;
-            not_negative("damping", material.damping)?;
-            not_negative("mass_damping", material.mass_damping)?;
-            fraction("mooney", material.mooney)?;
-            not_negative("k1", material.k1)?;
-            positive("k2", material.k2)?;
-            let valid = (0.0..=1.0 / 3.0).contains(&material.kappa);
-            check("kappa", material.kappa, valid, "from 0 to 1/3")?;
+            for (parameter, value) in Material::PARAMETERS.iter().zip(material.values()) {
+                let range = parameter.range;
+                check(parameter.name, value, (range.holds)(value), range.words)?;
+            }
             for fibre in material.fibres.into_iter().flatten() {
                 let length = fibre.iter().fold(0.0, |largest: f64, x| largest.max(x.abs()));
                 check("length of a fibre", length, length > 0.0, "greater than 0")?;

@@ -156,19 +156,15 @@ fn tree(body: &Body, file: String) -> Tree {
 }
 
 fn entries(material: &Material) -> MaterialEntries {
-    MaterialEntries {
+    let mut entries = MaterialEntries {
         law: Some(material.law),
-        young: Some(material.young),
-        poisson: Some(material.poisson),
-        density: Some(material.density),
-        damping: Some(material.damping),
-        mass_damping: Some(material.mass_damping),
-        mooney: Some(material.mooney),
-        k1: Some(material.k1),
-        k2: Some(material.k2),
-        kappa: Some(material.kappa),
         fibres: material.fibres,
+        ..MaterialEntries::default()
+    };
+    for (entry, value) in entries.values_mut().into_iter().zip(material.values()) {
+        *entry = Some(value);
     }
+    entries
 }
 
 fn attachment(attachment: &Attachment, model: &Model) -> AttachmentEntries {

@@ -6,8 +6,7 @@ use glam::{DMat3, DQuat, DVec3};
 use palpate_geometry::Point;
 
 use super::diagnostic::{Source, Span};
-use crate::body::{Appearance, ContactSettings, Law, Material, Pose};
-use crate::mesh::FIBRE_FAMILIES;
+use crate::body::{Appearance, ContactSettings, Material, MaterialEntries, Pose};
 
 /// A model file, parsed. Comments are not kept. Documents compare by what they say, not by spelling.
 #[derive(Clone, Debug)]
@@ -208,33 +207,6 @@ impl Rotation {
     }
 }
 
-/// An MT block: what it says and what it leaves open. Units as in [`Material`].
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct MaterialEntries {
-    /// `law`.
-    pub law: Option<Law>,
-    /// `young` [Pa].
-    pub young: Option<f64>,
-    /// `poisson`.
-    pub poisson: Option<f64>,
-    /// `density` [kg/m³].
-    pub density: Option<f64>,
-    /// `damping` [s].
-    pub damping: Option<f64>,
-    /// `mass_damping` [1/s].
-    pub mass_damping: Option<f64>,
-    /// `mooney`.
-    pub mooney: Option<f64>,
-    /// `k1` [Pa].
-    pub k1: Option<f64>,
-    /// `k2`.
-    pub k2: Option<f64>,
-    /// `kappa`.
-    pub kappa: Option<f64>,
-    /// `fibre` and `fibre_2`, in the coordinates of the mesh file, of any length but zero.
-    pub fibres: [Option<Point>; FIBRE_FAMILIES],
-}
-
 /// An MT block of one region of the mesh.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct RegionEntries {
@@ -264,37 +236,28 @@ impl RegionEntries {
 impl MaterialEntries {
     /// These entries over those of an outer block.
     pub(super) fn over(&self, outer: &Self) -> Self {
-        Self {
-            law: self.law.or(outer.law),
-            young: self.young.or(outer.young),
-            poisson: self.poisson.or(outer.poisson),
-            density: self.density.or(outer.density),
-            damping: self.damping.or(outer.damping),
-            mass_damping: self.mass_damping.or(outer.mass_damping),
-            mooney: self.mooney.or(outer.mooney),
-            k1: self.k1.or(outer.k1),
-            k2: self.k2.or(outer.k2),
-            kappa: self.kappa.or(outer.kappa),
-            fibres: [0, 1].map(|family| self.fibres[family].or(outer.fibres[family])),
+        let mut both = *outer;
+        both.law = self.law.or(outer.law);
+        for (value, own) in both.values_mut().into_iter().zip(self.values()) {
+            *value = own.or(*value);
         }
+        both.fibres = [0, 1].map(|family| self.fibres[family].or(outer.fibres[family]));
+        both
     }
 
     /// The material; `placement` turns the fibres with the mesh.
     pub(super) fn material(&self, placement: &Pose) -> Material {
         let default = Material::default();
+        let mut values = default.values();
+        for (value, said) in values.iter_mut().zip(self.values()) {
+            *value = said.unwrap_or(*value);
+        }
         Material {
             law: self.law.unwrap_or(default.law),
-            young: self.young.unwrap_or(default.young),
-            poisson: self.poisson.unwrap_or(default.poisson),
-            density: self.density.unwrap_or(default.density),
-            damping: self.damping.unwrap_or(default.damping),
-            mass_damping: self.mass_damping.unwrap_or(default.mass_damping),
-            mooney: self.mooney.unwrap_or(default.mooney),
-            k1: self.k1.unwrap_or(default.k1),
-            k2: self.k2.unwrap_or(default.k2),
-            kappa: self.kappa.unwrap_or(default.kappa),
             fibres: self.fibres.map(|fibre| fibre.map(|fibre| turned(fibre, placement))),
+            ..default
         }
+        .with_values(values)
     }
 }
 

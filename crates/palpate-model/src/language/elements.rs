@@ -2,28 +2,13 @@
 
 use super::diagnostic::Span;
 use super::document::{
-    AppearanceEntries, AttachmentEntries, ContactEntries, Fixed, FixedRegion, MaterialEntries,
-    PathKey, RegionEntries, Rotation, Transform,
+    AppearanceEntries, AttachmentEntries, ContactEntries, Fixed, FixedRegion, PathKey,
+    RegionEntries, Rotation, Transform,
 };
 use super::lexer::Token;
 use super::near::near_miss;
 use super::parser::{Parser, is_entry, is_keyword};
-use crate::body::Law;
-
-const MATERIAL_ENTRIES: [&str; 12] = [
-    "law",
-    "young",
-    "poisson",
-    "density",
-    "damping",
-    "mass_damping",
-    "mooney",
-    "k1",
-    "k2",
-    "kappa",
-    "fibre",
-    "fibre_2",
-];
+use crate::body::{Law, Material, MaterialEntries, Parameter};
 
 const NONE_AGAIN: &[&str] = &[];
 
@@ -342,7 +327,8 @@ impl Parser<'_> {
 
     fn material_entries(&mut self, span: Span, of_region: bool) -> MaterialEntries {
         let mut material = MaterialEntries::default();
-        let allowed = MATERIAL_ENTRIES;
+        let names = Material::PARAMETERS.map(|parameter| parameter.name);
+        let allowed = [&["law"][..], &names, &["fibre", "fibre_2"]].concat();
         self.entries("MT", span, &allowed, NONE_AGAIN, |parser, keyword, span| match keyword {
             "damping" | "mass_damping" if of_region => {
                 let message = format!("{keyword} is that of the whole body, not of a region");
@@ -353,26 +339,14 @@ impl Parser<'_> {
                 let name = parser.choice("law", &Law::NAMES);
                 material.law = name.and_then(|name| name.parse().ok());
             }
-            "young" => material.young = parser.positive("young", span),
-            "poisson" => {
-                let valid = |value| -1.0 < value && value < 0.5;
-                material.poisson =
-                    parser.checked("poisson", span, valid, "greater than -1 and less than 0.5");
+            "fibre" => material.fibres[0] = parser.fibre(keyword, span),
+            "fibre_2" => material.fibres[1] = parser.fibre(keyword, span),
+            _ => {
+                let places = material.values_mut().into_iter().zip(Material::PARAMETERS);
+                for (place, Parameter { range, .. }) in places.filter(|it| it.1.name == keyword) {
+                    *place = parser.checked(keyword, span, range.holds, range.words);
+                }
             }
-            "density" => material.density = parser.positive("density", span),
-            "damping" => material.damping = parser.not_negative("damping", span),
-            "mass_damping" => material.mass_damping = parser.not_negative("mass_damping", span),
-            "mooney" => {
-                let valid = |value| (0.0..=1.0).contains(&value);
-                material.mooney = parser.checked("mooney", span, valid, "from 0 to 1");
-            }
-            "k1" => material.k1 = parser.not_negative("k1", span),
-            "k2" => material.k2 = parser.positive("k2", span),
-            "kappa" => {
-                let valid = |value| (0.0..=1.0 / 3.0).contains(&value);
-                material.kappa = parser.checked("kappa", span, valid, "from 0 to 1/3");
-            }
-            _ => material.fibres[usize::from(keyword == "fibre_2")] = parser.fibre(keyword, span),
         });
         material
     }

@@ -10,12 +10,12 @@ use glam::{DMat3, DVec3};
 use super::diagnostic::{Diagnostic, ModelError, Span};
 use super::document::{
     AppearanceEntries, AttachmentEntries, Block, ContactEntries, Document, Fixed, FixedRegion,
-    MaterialEntries, PathKey, RegionEntries, Settings, Tree,
+    PathKey, RegionEntries, Settings, Tree,
 };
 use super::near::near_miss;
 use crate::body::{
-    Attachment, AttachmentError, Body, BodyError, Material, Model, Pose, RigidKey, RigidMotion,
-    Structure,
+    Attachment, AttachmentError, Body, BodyError, Material, MaterialEntries, Model, Pose, RigidKey,
+    RigidMotion, Structure,
 };
 use crate::files::{FileError, ReadMesh, ReadOptions, read_mesh};
 use crate::mesh::{Mesh, MeshError};

@@ -8,27 +8,19 @@ use super::diagnostic::{Diagnostic, ModelError, Source, Span};
 use super::document::{Block, Branch, Document, Settings, Tree, Unit};
 use super::lexer::{Token, tokens};
 use super::near::near_miss;
+use crate::body::Material;
 
 const ELEMENTS: [&str; 12] =
     ["BRANCH", "TREE", "ME", "PE", "NE", "MT", "FX", "RG", "CN", "VE", "IV", "AT"];
 const IN_BRANCH: [&str; 7] = ["ME", "MT", "CN", "VE", "AT", "BRANCH", "TREE"];
 const IN_TREE: [&str; 9] = ["ME", "PE", "NE", "MT", "FX", "RG", "CN", "VE", "IV"];
 
-/// Entries, and the element that each stands in.
-const ENTRIES: [(&str, &str); 28] = [
+/// Entries but the parameters of materials, and the element that each stands in.
+const ENTRIES: [(&str, &str); 19] = [
     ("trans", "ME"),
     ("rot", "ME"),
     ("scale", "ME"),
     ("law", "MT"),
-    ("young", "MT"),
-    ("poisson", "MT"),
-    ("density", "MT"),
-    ("damping", "MT"),
-    ("mass_damping", "MT"),
-    ("mooney", "MT"),
-    ("k1", "MT"),
-    ("k2", "MT"),
-    ("kappa", "MT"),
     ("fibre", "MT"),
     ("fibre_2", "MT"),
     ("region", "MT"),
@@ -56,9 +48,16 @@ pub(super) fn is_keyword(word: &str) -> bool {
     ELEMENTS.contains(&word)
 }
 
+/// The element that an entry stands in.
+fn home_of(word: &str) -> Option<&'static str> {
+    let others = ENTRIES.iter().find(|(entry, _)| *entry == word).map(|(_, home)| *home);
+    let is_parameter = || Material::PARAMETERS.iter().any(|parameter| parameter.name == word);
+    others.or_else(|| is_parameter().then_some("MT"))
+}
+
 /// True for words that begin an entry of an element.
 pub(super) fn is_entry(word: &str) -> bool {
-    ENTRIES.iter().any(|(entry, _)| *entry == word) || ["fixed", "angle"].contains(&word)
+    home_of(word).is_some() || ["fixed", "angle"].contains(&word)
 }
 
 impl Document {
@@ -446,7 +445,7 @@ impl Parser<'_> {
             if let Some(keyword) = allowed.iter().find(|&&keyword| keyword == word) {
                 return Item::Element(keyword, span);
             }
-            let home = ENTRIES.iter().find(|(entry, _)| *entry == word).map(|(_, home)| *home);
+            let home = home_of(&word);
             if is_keyword(&word) {
                 let message = match block {
                     Some(block) => format!("{word} does not stand in a {block}"),

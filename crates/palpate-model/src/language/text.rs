@@ -5,11 +5,12 @@ use std::fmt::{self, Display, Write};
 use palpate_geometry::Point;
 
 use super::document::{
-    AttachmentEntries, Block, Document, FixedRegion, MaterialEntries, PathKey, RegionEntries,
-    Rotation, Settings, Transform, Tree, Unit,
+    AttachmentEntries, Block, Document, FixedRegion, PathKey, RegionEntries, Rotation, Settings,
+    Transform, Tree, Unit,
 };
 use super::lexer::is_one_word;
 use super::parser::{is_entry, is_keyword};
+use crate::body::{Material, MaterialEntries};
 use crate::number::{Shortest, Triple};
 
 impl Document {
@@ -153,26 +154,14 @@ fn write_material(
     material: &MaterialEntries,
     depth: usize,
 ) {
-    let number =
-        |name, value: Option<f64>| value.map(|value| format!("{name} {}", Shortest(value)));
-    let MaterialEntries { law, young, poisson, density, damping, mass_damping, .. } = *material;
-    let MaterialEntries { mooney, k1, k2, kappa, fibres, .. } = *material;
     let fibre = |name, fibre: Option<Point>| fibre.map(|d| format!("{name} {}", Triple(d)));
-    let entries = [
-        law.map(|law| format!("law {law}")),
-        number("young", young),
-        number("poisson", poisson),
-        number("density", density),
-        number("damping", damping),
-        number("mass_damping", mass_damping),
-        number("mooney", mooney),
-        number("k1", k1),
-        number("k2", k2),
-        number("kappa", kappa),
-        fibre("fibre", fibres[0]),
-        fibre("fibre_2", fibres[1]),
-    ];
-    let entries: Vec<String> = entries.into_iter().flatten().collect();
+    let numbers = Material::PARAMETERS.iter().zip(material.values()).map(|(parameter, value)| {
+        value.map(|value| format!("{} {}", parameter.name, Shortest(value)))
+    });
+    let entries = [material.law.map(|law| format!("law {law}"))].into_iter().chain(numbers);
+    let [first, second] = material.fibres;
+    let fibres = [fibre("fibre", first), fibre("fibre_2", second)];
+    let entries: Vec<String> = entries.chain(fibres).flatten().collect();
     match region {
         Some(region) => {
             line(text, depth, format_args!("MT region {region} {{ {} }}", entries.join("  ")));
