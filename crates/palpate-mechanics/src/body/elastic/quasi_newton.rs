@@ -456,7 +456,8 @@ impl ElasticBody {
             pair.alpha = pair.rho * dot(&pair.s, scratch);
             add_scaled(scratch, -pair.alpha, &pair.y);
         }
-        self.respond_to(scratch);
+        // Elements of these laws turn by themselves.
+        self.solve(scratch, None);
         for pair in &pairs[..known] {
             let beta = pair.rho * dot(&pair.y, scratch);
             add_scaled(scratch, pair.alpha - beta, &pair.s);

@@ -9,6 +9,8 @@ use crate::body::inertia::{Inertia, RunningInertia};
 
 /// Part of the energy of its spin that a touched body may gain when its spin is put right.
 const ENERGY_SLACK: f64 = 1e-4;
+/// What a body gains at rest is at most this part of the speed that its weight gives it in a step.
+const RESTING: f64 = 1e-3;
 
 impl ElasticBody {
     /// Rotates the body exactly about its centre and carries the rest of the velocity along, so that a
@@ -76,16 +78,23 @@ impl ElasticBody {
     }
 
     /// The response to contact turns the body by an amount of second order too much; positions stay,
-    /// or surfaces would overlap, and the velocities are put right. With the linear law, whose internal
-    /// forces have a torque, only where that slows the body: one at rest under its weight, which
-    /// contact turns back in every step, would otherwise keep a velocity that moves nothing.
+    /// or surfaces would overlap, and the velocities are put right. Not where
+    /// that makes a body faster which rests under its weight and which contact turns back in every step: it would
+    /// keep a velocity that moves nothing. Nor with the linear law, whose internal forces have a torque,
+    /// wherever that makes a touched body faster.
     pub(super) fn correct_spin(&self, target: DVec3, touched: bool, x: &[Point], v: &mut [Point]) {
         let now = Inertia::new(&self.masses, x, v);
         let inverse = now.tensor.inverse();
         let omega = inverse * (target - now.spin);
         let energy = |spin: DVec3| spin.dot(inverse * spin);
         let gains_energy = energy(target) > (1.0 + ENERGY_SLACK) * energy(now.spin);
-        if !omega.is_finite() || (touched && gains_energy && self.is_linear()) {
+        let rests = || {
+            let arms = x.iter().map(|&x| DVec3::from_array(x) - now.center);
+            let squares = arms.map(|r| omega.cross(r).length_squared());
+            let fastest = squares.fold(0.0, f64::max).sqrt();
+            fastest <= RESTING * self.gravity.length() * self.time_step
+        };
+        if !omega.is_finite() || (touched && gains_energy && (self.is_linear() || rests())) {
             return;
         }
         for (v, &x) in v.iter_mut().zip(x) {

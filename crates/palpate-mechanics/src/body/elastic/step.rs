@@ -34,7 +34,8 @@ pub(super) struct Step {
     pub(super) response: Vec<[f64; 3]>,
     /// Rotations of the predicted positions of an unattached body.
     rotations: Rotations,
-    /// Whether loads turn the body by these rotations alone.
+    /// Whether contact forces turn the body by these rotations alone, as the compliance between contacts
+    /// has it, whatever the law: what differs from that takes contacts for kept that are not.
     turns: bool,
     /// How contact forces turn the body: known once it has been touched in about this shape.
     pub(super) turning: Turning,
@@ -274,15 +275,13 @@ impl ElasticBody {
             return;
         }
         let (center, to_frame) = (self.step.center, self.step.frame.transpose());
-        let (gain, linear) = (self.gain(), self.is_linear());
+        let gain = self.gain();
         let Self { step, masses, .. } = self;
         let arms = step.positions.iter().map(|&x| to_frame * (x - center));
-        let turns = step.rotations.set(masses, arms, gain);
-        // Elements of other laws turn by themselves, and iterating puts the rest right.
-        step.turns = turns && linear;
+        step.turns = step.rotations.set(masses, arms, gain);
         let (arms, known) = (step.rotations.arms(), step.turning.rotations().arms());
-        step.turning_known &=
-            turns && largest_change(arms.iter().copied(), known.iter().copied()) <= SHAPE_TOLERANCE;
+        step.turning_known &= step.turns
+            && largest_change(arms.iter().copied(), known.iter().copied()) <= SHAPE_TOLERANCE;
     }
 
     /// How contact forces turn the body; `None` if it is attached.
@@ -321,7 +320,9 @@ impl ElasticBody {
         };
         let mut response = std::mem::take(&mut self.step.response);
         self.load(&mut response, change);
-        self.respond_to(&mut response);
+        let torque = self.balance(&mut response);
+        self.solve(&mut response, None);
+        self.turn(torque, &mut response);
         if let Elasticity::Nonlinear(method) = &self.elasticity {
             self.limit(&mut response, method.longest_response());
         }
@@ -367,14 +368,6 @@ impl ElasticBody {
         };
         self.elasticity = elasticity;
         changed
-    }
-
-    /// Turns loads on the free nodes, in the frame, into displacements; torques turn an unattached body
-    /// by what its inertia says.
-    pub(super) fn respond_to(&mut self, loads: &mut [[f64; 3]]) {
-        let torque = self.balance(loads);
-        self.solve(loads, None);
-        self.turn(torque, loads);
     }
 
     fn balance(&self, loads: &mut [[f64; 3]]) -> DVec3 {
