@@ -203,6 +203,7 @@ impl Simulation {
         }
         times.detection = begin.elapsed();
         self.model = model;
+        self.finer = None;
         times.total = start.elapsed();
         Ok(ChangeReport { bodies: changes, times })
     }
@@ -213,6 +214,9 @@ impl Simulation {
         self.dynamics.exchange(model, &snapshot.state)?;
         let meshes: Vec<_> = model.bodies.iter().map(|body| Arc::clone(&body.mesh)).collect();
         self.scene.exchange(&meshes, &model.structure)?;
+        if !Arc::ptr_eq(&self.model, model) {
+            self.finer = None;
+        }
         self.model = Arc::clone(model);
         self.pending.clone_from(&snapshot.pending);
         Ok(())
