@@ -37,13 +37,15 @@ class Squeeze:
     """An organ pressed flat between two plates and let go.
 
     Over time [s]: the distance of the plates over the organ's rest thickness, the largest distance
-    of a node from the rest shape over the organ's size, and inverted tetrahedra. At the end: pairs
-    of surface triangles that intersect, and the fastest node [m/s].
+    of a node from the rest shape over the organ's size, how far a node is beyond a plate over the
+    thickness, and inverted tetrahedra. At the end: pairs of surface triangles that intersect, and
+    the fastest node [m/s].
     """
 
     times: Float64Array
     gaps: Float64Array
     misfits: Float64Array
+    beyond: Float64Array
     inverted: Float64Array
     intersections: int
     speed: float
@@ -90,14 +92,16 @@ def squeeze(
                 simulation.time,
                 (above[0, 2] - below[0, 2]) / thickness,
                 misfit(organ, x),
+                max(below[0, 2] - x[:, 2].min(), x[:, 2].max() - above[0, 2], 0.0) / thickness,
                 (signed_volumes(x, organ.tetrahedra) <= 0).sum(),
             )
         )
-    times, gaps, misfits, inverted = np.array(rows).T
+    times, gaps, misfits, beyond, inverted = np.array(rows).T
     return Squeeze(
         times,
         gaps,
         misfits,
+        beyond,
         inverted,
         len(simulation.intersections()),
         float(np.linalg.norm(simulation.velocities[0], axis=1).max()),
