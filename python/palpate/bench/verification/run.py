@@ -240,10 +240,7 @@ def check_organs(folder: Path | None) -> list[Finding]:
                 f"squeezed to 30 %, {name}",
                 "misfit 0.01, 0 inverted, 0 pairs, 0.001 beyond a plate",
                 f"misfit {misfit:.1e}, {left} inverted, {squeeze.intersections} pairs, {beyond:.0e}",
-                misfit < 0.01
-                and left == 0
-                and squeeze.intersections == 0
-                and beyond < 1e-3,
+                misfit < 0.01 and left == 0 and squeeze.intersections == 0 and beyond < 1e-3,
             )
         )
     for name, heap in heaps.items():
