@@ -239,7 +239,8 @@ def check_organs(folder: Path | None) -> list[Finding]:
             Finding(
                 f"squeezed to 30 %, {name}",
                 "misfit 0.01, 0 inverted, 0 pairs, 0.001 beyond a plate",
-                f"misfit {misfit:.1e}, {left} inverted, {squeeze.intersections} pairs, {beyond:.0e}",
+                f"misfit {misfit:.1e}, {left} inverted, {squeeze.intersections} pairs, "
+                f"{beyond:.0e} beyond",
                 misfit < 0.01 and left == 0 and squeeze.intersections == 0 and beyond < 1e-3,
             )
         )
