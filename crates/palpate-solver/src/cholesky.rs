@@ -26,6 +26,7 @@ use supernodes::Supernodes;
 
 /// Columns of its nodes must have 32-bit numbers.
 const MOST_NODES: usize = u32::MAX as usize / 3;
+
 /// The precision that a factor is kept and solved in. It is always computed in double precision.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Precision {

@@ -202,8 +202,7 @@ impl Simulation {
             self.scene.change_body(each.body, &each.change)?;
         }
         times.detection = begin.elapsed();
-        self.model = model;
-        self.finer = None;
+        self.set_model(model);
         times.total = start.elapsed();
         Ok(ChangeReport { bodies: changes, times })
     }
@@ -214,10 +213,7 @@ impl Simulation {
         self.dynamics.exchange(model, &snapshot.state)?;
         let meshes: Vec<_> = model.bodies.iter().map(|body| Arc::clone(&body.mesh)).collect();
         self.scene.exchange(&meshes, &model.structure)?;
-        if !Arc::ptr_eq(&self.model, model) {
-            self.finer = None;
-        }
-        self.model = Arc::clone(model);
+        self.set_model(Arc::clone(model));
         self.pending.clone_from(&snapshot.pending);
         Ok(())
     }

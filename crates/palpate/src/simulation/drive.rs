@@ -67,8 +67,7 @@ impl Simulation {
         model.bodies[body].fixed_nodes = nodes;
         let change = MeshChange::identity(&model.bodies[body].mesh);
         self.dynamics.change_body(&model, body, &change)?;
-        self.model = Arc::new(model);
-        self.finer = None;
+        self.set_model(Arc::new(model));
         Ok(())
     }
 }

@@ -79,13 +79,16 @@ impl Simulation {
         Ok(all.expect("at least one part"))
     }
 
+    /// Goes on with a model; matrices for smaller steps of another one are given up.
+    pub(super) fn set_model(&mut self, model: Arc<Model>) {
+        self.finer = self.finer.take().filter(|finer| Arc::ptr_eq(&finer.model, &model));
+        self.model = model;
+    }
+
     /// The bodies in the present state with a time step of so many parts: those of the last time if
     /// they serve.
     fn finer(&mut self, substeps: u32) -> Result<Box<Finer>, SimulationError> {
-        let kept = self
-            .finer
-            .take()
-            .filter(|finer| finer.substeps == substeps && Arc::ptr_eq(&finer.model, &self.model));
+        let kept = self.finer.take().filter(|finer| finer.substeps == substeps);
         if let Some(mut finer) = kept {
             finer.dynamics.set_state(&self.dynamics.state())?;
             return Ok(finer);
