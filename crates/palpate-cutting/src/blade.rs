@@ -6,6 +6,7 @@ mod sheets;
 mod triangulate;
 
 use palpate_geometry::{Aabb, Point, vec3};
+use serde::{Deserialize, Serialize};
 
 pub use file::{BladeFileError, BladeFileErrorCause, Stroke, When, parse_strokes, read_strokes};
 pub(crate) use sheet::{Sheet, Side};
@@ -13,15 +14,41 @@ pub(crate) use sheet::{Sheet, Side};
 /// A surface that cuts what it passes through.
 ///
 /// It may be open or closed, bent, in several parts, and branch; its two sides must be distinct.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(try_from = "Shape", into = "Shape")]
 pub struct Blade(Shape);
 
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 enum Shape {
     /// Points, and the triangles of each sheet, coherently oriented.
     Surface { points: Vec<Point>, sheets: Vec<Vec<[u32; 3]>> },
     /// All of the plane through `point`; `normal` is a unit vector.
     Plane { point: Point, normal: Point },
+}
+
+impl From<Blade> for Shape {
+    fn from(blade: Blade) -> Self {
+        blade.0
+    }
+}
+
+impl TryFrom<Shape> for Blade {
+    type Error = BladeError;
+
+    /// The very shape that was written; it may have been damaged since.
+    fn try_from(shape: Shape) -> Result<Self, BladeError> {
+        match &shape {
+            Shape::Surface { points, sheets } => {
+                for sheet in sheets {
+                    Self::new(points, sheet)?;
+                }
+            }
+            Shape::Plane { point, normal } => {
+                Self::plane(*point, *normal, None)?;
+            }
+        }
+        Ok(Self(shape))
+    }
 }
 
 /// Why arrays do not make a blade.

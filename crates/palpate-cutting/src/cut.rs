@@ -2,6 +2,7 @@
 
 use palpate_geometry::{Aabb, Point, tetrahedron};
 use palpate_model::{Mesh, MeshChange, MeshError};
+use serde::{Deserialize, Serialize};
 
 use crate::blade::{Blade, Sheet};
 use crate::crossing::{Crossing, Sides, crossed_edges};
@@ -13,7 +14,7 @@ use crate::snap;
 use crate::split;
 
 /// How a cut treats what the blade nearly meets.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 pub struct CutOptions {
     /// A node closer to the blade than this part of a crossed edge counts as on the blade: the cut
     /// passes through it. In [0, 0.5].
@@ -33,6 +34,35 @@ pub struct CutOptions {
 impl CutOptions {
     /// Usual shortest edge, as a part of the mean edge of a mesh's surface: it costs little accuracy.
     pub const EDGE: f64 = 0.1;
+
+    /// Whether all of them are in their ranges.
+    ///
+    /// # Errors
+    /// If one is not.
+    pub fn check(&self) -> Result<(), CutError> {
+        let CutOptions { snap, min_quality, min_edge, min_piece } = *self;
+        let min_edge = min_edge.unwrap_or(0.0);
+        let ranges = [
+            ("snap", snap, (0.0..=0.5).contains(&snap), "in [0, 0.5]"),
+            ("min_quality", min_quality, (0.0..=1.0).contains(&min_quality), "in [0, 1]"),
+            (
+                "min_edge",
+                min_edge,
+                min_edge >= 0.0 && min_edge.is_finite(),
+                "a length, or 0 for none",
+            ),
+            (
+                "min_piece",
+                min_piece,
+                min_piece >= 0.0 && min_piece.is_finite(),
+                "finite, or 0 for none",
+            ),
+        ];
+        match ranges.into_iter().find(|(_, _, is_right, _)| !is_right) {
+            Some((name, value, _, range)) => Err(CutError::Option { name, value, range }),
+            None => Ok(()),
+        }
+    }
 }
 
 impl Default for CutOptions {
@@ -196,23 +226,7 @@ fn check(mesh: &Mesh, positions: &[Point], options: &CutOptions) -> Result<(), C
     if let Some(node) = positions.iter().position(|point| !is_finite(point)) {
         return Err(CutError::NonFinitePosition { node, position: positions[node] });
     }
-    let CutOptions { snap, min_quality, min_edge, min_piece } = *options;
-    let min_edge = min_edge.unwrap_or(0.0);
-    let ranges = [
-        ("snap", snap, (0.0..=0.5).contains(&snap), "in [0, 0.5]"),
-        ("min_quality", min_quality, (0.0..=1.0).contains(&min_quality), "in [0, 1]"),
-        ("min_edge", min_edge, min_edge >= 0.0 && min_edge.is_finite(), "a length, or 0 for none"),
-        (
-            "min_piece",
-            min_piece,
-            min_piece >= 0.0 && min_piece.is_finite(),
-            "finite, or 0 for none",
-        ),
-    ];
-    match ranges.into_iter().find(|(_, _, is_right, _)| !is_right) {
-        Some((name, value, _, range)) => Err(CutError::Option { name, value, range }),
-        None => Ok(()),
-    }
+    options.check()
 }
 
 /// What one sheet did.

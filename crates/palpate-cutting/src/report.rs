@@ -26,3 +26,23 @@ pub struct CutReport {
     /// old nodes through which it passes, at present positions.
     pub deviation: f64,
 }
+
+impl CutReport {
+    /// This cut and `next` of the mesh that it made, as one.
+    #[must_use]
+    pub fn then(&self, next: &Self) -> Self {
+        let qualities = [self.smallest_quality, next.smallest_quality].into_iter().flatten();
+        Self {
+            new_nodes: self.new_nodes + next.new_nodes,
+            new_tetrahedra: self.new_tetrahedra + next.new_tetrahedra,
+            split_tetrahedra: self.split_tetrahedra + next.split_tetrahedra,
+            snapped_nodes: self.snapped_nodes + next.snapped_nodes,
+            pieces_before: self.pieces_before,
+            pieces: next.pieces,
+            smallest_quality: qualities.reduce(f64::min),
+            volume_change: (1.0 + self.volume_change) * (1.0 + next.volume_change) - 1.0,
+            cut_area: self.cut_area + next.cut_area,
+            deviation: self.deviation.max(next.deviation),
+        }
+    }
+}

@@ -16,6 +16,8 @@ use palpate_solver::OrderingMethod;
 use crate::contact::compliance::ComplianceCache;
 use crate::error::MechanicsError;
 use crate::state::BodyState;
+pub use change::BodyBasis;
+use elastic::MatrixBefore;
 pub(crate) use elastic::{ElasticBody, Known};
 pub(crate) use rigid::RigidBody;
 

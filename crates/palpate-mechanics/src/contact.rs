@@ -6,7 +6,7 @@ pub(crate) mod filter;
 mod gauss_seidel;
 pub(crate) mod last_forces;
 mod law;
-mod node_compliance;
+pub(crate) mod node_compliance;
 mod patch;
 pub(crate) mod problem;
 pub(crate) mod response;

@@ -25,6 +25,7 @@ use crate::energy::{Energy, Momentum};
 use crate::error::MechanicsError;
 use crate::state::{BodyState, ContactForce, State};
 use crate::ties::Ties;
+pub use change::ChangedBody;
 pub use drive::Drive;
 use drive::Drives;
 pub use failure::{Cause, Failure};

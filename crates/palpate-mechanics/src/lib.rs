@@ -14,8 +14,11 @@ mod state;
 mod ties;
 mod tissue;
 
+pub use body::BodyBasis;
 pub use contact::{Contact, Patch, PatchMemory, Touch};
-pub use dynamics::{Cause, Drive, Dynamics, DynamicsOptions, Failure, StageTimes, StepStats};
+pub use dynamics::{
+    Cause, ChangedBody, Drive, Dynamics, DynamicsOptions, Failure, StageTimes, StepStats,
+};
 pub use energy::{Energy, Momentum};
 pub use error::MechanicsError;
 pub use state::{BodyState, ContactForce, State};

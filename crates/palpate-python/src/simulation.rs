@@ -193,15 +193,19 @@ impl PySimulation {
 
     /// Steps `count` times; what `palpate.StepReport` holds.
     fn step<'py>(&self, py: Python<'py>, count: usize) -> PyResult<Bound<'py, PyDict>> {
+        let mut cuts = Vec::new();
         let (report, times, stages, iterations, newton, substeps) = {
             let mut summed = StepTimes::default();
-            let mut stages = [0.0; 9];
+            let mut stages = [0.0; 10];
             let (mut iterations, mut newton, mut substeps) = (0, 0, 0);
             let mut last: Option<StepReport> = None;
             for _ in 0..count {
                 // One step at a time, so that Ctrl-C is answered between them.
                 py.check_signals()?;
-                let report = raise(py, py.detach(|| self.simulation.lock().step()))?;
+                let mut report = raise(py, py.detach(|| self.simulation.lock().step()))?;
+                if let Some(opened) = report.opened.take() {
+                    cuts.push(change_rows(py, &opened)?);
+                }
                 summed += report.times;
                 for (sum, (_, time)) in stages.iter_mut().zip(report.stages()) {
                     *sum += time.as_secs_f64();
@@ -233,6 +237,7 @@ impl PySimulation {
         row.set_item("iterations", iterations)?;
         row.set_item("residual", report.mechanics.residual)?;
         row.set_item("substeps", substeps)?;
+        row.set_item("cuts", cuts)?;
         Ok(row)
     }
 
@@ -340,6 +345,22 @@ impl PySimulation {
         let options = cutting::options(options);
         let report = raise(py, py.detach(|| self.simulation.lock().cut(&blade.blade, &options)))?;
         change_rows(py, &report)
+    }
+
+    fn cut_live(
+        &self,
+        py: Python<'_>,
+        blade: &PyBlade,
+        options: Options,
+        delay: u32,
+    ) -> PyResult<()> {
+        let options = cutting::options(options);
+        raise(py, self.simulation.lock_attached(py).cut_live(&blade.blade, &options, delay))
+    }
+
+    #[getter]
+    fn has_live_cuts(&self, py: Python<'_>) -> bool {
+        self.simulation.lock_attached(py).has_live_cuts()
     }
 
     fn remove<'py>(

@@ -1,14 +1,16 @@
-//! What each frame of a long cut costs: the stages of the cut and of the step after it.
+//! What each frame of a long cut costs: the stages of the cut and of the step after it. With a delay the
+//! cut is prepared beside the steps, and frames begin 1/60 s apart or later.
 //!
-//! `cargo run --release -p palpate --example cut_frames MODEL BODY [FRAMES [THREADS [SETTLE]]]`
+//! `cargo run --release -p palpate --example cut_frames MODEL BODY [FRAMES [THREADS [SETTLE [DELAY]]]]`
 
 #![allow(clippy::print_stdout)] // it is what the example is for
 
 use std::error::Error;
 use std::path::Path;
+use std::time::{Duration, Instant};
 
 use palpate::cutting::{Blade, CutOptions};
-use palpate::{CoreLoader, Simulation, SimulationOptions, load_model};
+use palpate::{ChangeReport, CoreLoader, Simulation, SimulationOptions, load_model};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1);
@@ -16,6 +18,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let name = arguments.next().ok_or("give the name of a body")?;
     let mut number = |default: usize| arguments.next().map_or(Ok(default), |text| text.parse());
     let (frames, threads, settle) = (number(100)?, number(1)?, number(240)?);
+    let delay = number(0)? as u32;
     let body = model.bodies.iter().position(|body| body.name == name).ok_or("no such body")?;
     let options = SimulationOptions { threads, ..SimulationOptions::default() };
     let mut simulation = Simulation::new(model, options)?;
@@ -41,11 +44,25 @@ fn main() -> Result<(), Box<dyn Error>> {
     };
     let mut rows: Vec<Vec<(&str, f64)>> = Vec::new();
     let mut opened = 0;
+    let first = Instant::now();
     for frame in 0..frames {
         let blade = Blade::stroke(&[edge(frame), edge(frame + 1)])?;
-        let cut = simulation.cut(&blade, &CutOptions::default())?;
+        let options = CutOptions::default();
+        let mut cut = ChangeReport::default();
+        if delay > 0 {
+            let due = first + Duration::from_secs_f64(frame as f64 / 60.0);
+            std::thread::sleep(due.saturating_duration_since(Instant::now()));
+        }
+        let begin = Instant::now();
+        if delay > 0 {
+            simulation.cut_live(&blade, &options, delay)?;
+        } else {
+            cut = simulation.cut(&blade, &options)?;
+        }
+        let mut step = simulation.step()?;
+        let all = begin.elapsed();
+        cut = step.opened.take().unwrap_or(cut);
         opened += usize::from(!cut.bodies.is_empty());
-        let step = simulation.step()?;
         let ms = |time: std::time::Duration| 1e3 * time.as_secs_f64();
         let mut row = vec![
             ("cutting", ms(cut.times.cutting)),
@@ -54,7 +71,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         ];
         row.extend(step.stages().map(|(name, time)| (name, ms(time))));
         row.push(("step", ms(step.times.total)));
-        row.push(("frame", ms(cut.times.total + step.times.total)));
+        row.push(("frame", ms(all)));
         row.push(("columns", step.mechanics.new_columns as f64));
         row.push(("newton", step.mechanics.newton_iterations as f64));
         row.push(("solves", step.mechanics.contact_solves as f64));

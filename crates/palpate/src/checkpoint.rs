@@ -13,11 +13,11 @@ use palpate_model::{Document, Model};
 use serde::{Deserialize, Serialize};
 
 use crate::simulation::{
-    PendingFaces, Simulation, SimulationError, SimulationOptions, Snapshot, Substeps,
+    LiveCuts, PendingFaces, Simulation, SimulationError, SimulationOptions, Snapshot, Substeps,
 };
 
 const MAGIC: [u8; 8] = *b"palpate\n";
-const VERSION: u32 = 7;
+const VERSION: u32 = 8;
 const HEADER: usize = 8 + 4 + 8 + 4;
 
 /// Why a checkpoint could not be written or read.
@@ -64,6 +64,7 @@ struct Payload<M, S> {
     state: S,
     initial_pending: PendingFaces,
     pending: PendingFaces,
+    live: LiveCuts,
 }
 
 impl Simulation {
@@ -85,6 +86,7 @@ impl Simulation {
             state: &now.state,
             initial_pending: initial.pending.clone(),
             pending: now.pending,
+            live: now.live,
         };
         let io = |source| CheckpointError::Io { path: path.to_path_buf(), source };
         let bytes = postcard::to_stdvec(&payload)
@@ -129,7 +131,9 @@ impl Simulation {
                 model: initial_model,
                 state: payload.initial,
                 pending: payload.initial_pending,
+                live: LiveCuts::default(),
             });
+            simulation.set_live_cuts(&payload.live)?;
             Ok(simulation)
         };
         continued()

@@ -3,6 +3,7 @@
 mod change;
 mod drive;
 mod hands;
+mod live;
 mod loops;
 mod substeps;
 
@@ -20,6 +21,8 @@ use palpate_model::{MeshError, Model};
 
 pub(crate) use change::PendingFaces;
 pub use change::{BodyChange, ChangeReport, ChangeTimes, Snapshot};
+pub(crate) use live::LiveCuts;
+use live::LiveWork;
 use loops::Link;
 use substeps::Finer;
 pub use substeps::Substeps;
@@ -118,6 +121,8 @@ fn in_parts(substeps: u32) -> String {
 /// Wall-clock time of each stage of a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct StepTimes {
+    /// Live cuts that open: what is left to do then, and waiting where they are late.
+    pub change: Duration,
     /// Refit of the bounding trees.
     pub update: Duration,
     /// Search for close surface elements.
@@ -132,8 +137,9 @@ pub struct StepTimes {
 
 impl StepTimes {
     /// Each stage by its name, in the order of the step.
-    pub fn named(&self) -> [(&'static str, Duration); 5] {
+    pub fn named(&self) -> [(&'static str, Duration); 6] {
         [
+            ("change", self.change),
             ("update", self.update),
             ("penetration", self.penetration),
             ("proximity", self.proximity),
@@ -145,6 +151,7 @@ impl StepTimes {
 
 impl AddAssign for StepTimes {
     fn add_assign(&mut self, other: Self) {
+        self.change += other.change;
         self.update += other.update;
         self.proximity += other.proximity;
         self.penetration += other.penetration;
@@ -170,6 +177,8 @@ pub struct StepReport {
     pub max_depth: f64,
     /// How many smaller steps it took: 1 unless the step failed and was tried again.
     pub substeps: u32,
+    /// What live cuts did that opened before the step.
+    pub opened: Option<ChangeReport>,
     /// The mechanics' own statistics.
     pub mechanics: StepStats,
 }
@@ -180,9 +189,10 @@ pub(crate) const CONTACT_PAIRS: ProximityOptions =
 
 impl StepReport {
     /// The finest stages by name, in the order of the step; together nearly the whole of it.
-    pub fn stages(&self) -> [(&'static str, Duration); 9] {
+    pub fn stages(&self) -> [(&'static str, Duration); 10] {
         let mechanics = &self.mechanics.times;
         [
+            ("change", self.times.change),
             ("update", self.times.update),
             ("penetration", self.times.penetration),
             ("proximity", self.times.proximity),
@@ -204,6 +214,8 @@ pub struct Simulation {
     dynamics: Dynamics,
     initial: Snapshot,
     pending: PendingFaces,
+    live: LiveCuts,
+    live_work: LiveWork,
     /// Copy of the last search: the scene's own list is gone when it searches for close pairs.
     penetration: Vec<PenetratingNode>,
     /// For steps that are tried again, once there was one.
@@ -238,13 +250,19 @@ impl Simulation {
     /// step, bit for bit.
     pub fn step(&mut self) -> Result<StepReport, SimulationError> {
         self.follow_loops()?;
+        let begin = Instant::now();
+        self.open_and_begin()?;
+        let change = begin.elapsed();
         self.dynamics.set_strict(self.options.substeps == Substeps::Auto);
-        let report = match self.advance(1) {
+        let mut report = match self.advance(1) {
             Err(SimulationError::Mechanics(MechanicsError::Step(failure))) => {
                 self.try_again(failure)
             }
             other => other,
         }?;
+        report.opened = self.take_opened();
+        report.times.change = change;
+        report.times.total += change;
         self.publish()?;
         Ok(report)
     }
@@ -291,6 +309,7 @@ impl Simulation {
             penetrating_nodes: penetration.len(),
             max_depth: penetration.iter().fold(0.0, |deepest, node| node.depth.max(deepest)),
             substeps: 1,
+            opened: None,
             mechanics,
         })
     }
@@ -385,7 +404,7 @@ impl Simulation {
     /// Everything, to come back to with [`Self::restore`].
     pub fn snapshot(&self) -> Snapshot {
         let (model, state) = (Arc::clone(&self.model), self.dynamics.state());
-        Snapshot { model, state, pending: self.pending.clone() }
+        Snapshot { model, state, pending: self.pending.clone(), live: self.live.clone() }
     }
 
     /// Returns to a snapshot of this simulation; it continues with the same bits. Cuts made since are
@@ -397,7 +416,7 @@ impl Simulation {
         if Arc::ptr_eq(&snapshot.model, &self.model) {
             self.dynamics.set_state(&snapshot.state)?;
             self.pending.clone_from(&snapshot.pending);
-            return Ok(());
+            return self.set_live_cuts(&snapshot.live);
         }
         // Cuts leave the bodies there, and only add to them.
         let mut names = snapshot.model.bodies.iter().map(|body| &body.name);
@@ -444,7 +463,8 @@ impl Simulation {
         pending: PendingFaces,
     ) -> Self {
         dynamics.share_threads(scene.threads());
-        let initial = Snapshot { model: Arc::clone(&model), state, pending: pending.clone() };
+        let (first, live) = (Arc::clone(&model), LiveCuts::default());
+        let initial = Snapshot { model: first, state, pending: pending.clone(), live };
         Self {
             model,
             options,
@@ -452,6 +472,8 @@ impl Simulation {
             dynamics,
             initial,
             pending,
+            live: LiveCuts::default(),
+            live_work: LiveWork::default(),
             penetration: Vec::new(),
             finer: None,
             loops: Vec::new(),
@@ -476,6 +498,7 @@ impl Simulation {
     pub fn restart_threads(&mut self) -> Result<(), SimulationError> {
         self.scene.restart_threads()?;
         self.dynamics.share_threads(self.scene.threads());
+        self.lose_work();
         Ok(())
     }
 

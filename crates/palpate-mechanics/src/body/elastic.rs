@@ -18,6 +18,8 @@ mod spin;
 mod step;
 mod system;
 
+use std::sync::Arc;
+
 use glam::{DMat3, DVec3};
 use palpate_geometry::Point;
 use palpate_model::{Body, Law};
@@ -27,7 +29,7 @@ use super::frame::best_rotation;
 use super::inertia::Inertia;
 use crate::error::MechanicsError;
 use driven::Driven;
-use quasi_newton::QuasiNewton;
+use quasi_newton::{QuasiNewton, StiffnessBefore};
 use step::Step;
 use system::{SystemMatrix, check_material, in_body_numbering, linear_stiffness, lumped_masses};
 
@@ -40,10 +42,10 @@ pub(crate) struct ElasticBody {
     /// Sum of the masses [kg].
     mass: f64,
     elasticity: Elasticity,
-    factor: Cholesky,
+    factor: Arc<Cholesky>,
     /// Nodes that are not fixed, and where each node is among them.
     free_nodes: Vec<u32>,
-    free_index: Vec<u32>,
+    free_index: Arc<Vec<u32>>,
     damping: f64,
     mass_damping: f64,
     gravity: DVec3,
@@ -72,9 +74,24 @@ pub(crate) struct Known<'a> {
     pub(crate) order: &'a [u32],
     /// Arms [m] of the shape whose stiffness A is to be made of, in its frame; empty: that at rest.
     pub(crate) shape: &'a [Point],
-    /// The body before a change of its mesh, whose A was made of the same shape, and for each free node
-    /// the one that it was, if any.
-    pub(crate) before: Option<(&'a ElasticBody, &'a [Option<u32>])>,
+    /// The matrix before a change of the mesh, and for each free node the one that it was, if any.
+    pub(crate) before: Option<(&'a MatrixBefore, &'a [Option<u32>])>,
+}
+
+/// What a matrix is known by when another one is to be made from it; what it was made of stays as it is.
+#[derive(Clone)]
+pub(crate) struct MatrixBefore {
+    factor: Arc<Cholesky>,
+    free_index: Arc<Vec<u32>>,
+    /// The stiffness in the shape that A was made of, of nonlinear laws.
+    pub(super) stiffness: Option<StiffnessBefore>,
+}
+
+impl MatrixBefore {
+    /// Where a node is among the free ones; `None` when it is fixed.
+    pub(super) fn free_place(&self, node: u32) -> Option<u32> {
+        Some(self.free_index[node as usize]).filter(|&place| place != FIXED)
+    }
 }
 
 impl ElasticBody {
@@ -132,8 +149,9 @@ impl ElasticBody {
             (Elasticity::Linear(stiffness), factored(&system.into_matrix())?)
         } else {
             let mut method = QuasiNewton::new(body, &free_index);
-            if let Some(Elasticity::Nonlinear(before)) = known.before.map(|(b, _)| &b.elasticity) {
-                method.take_over(before);
+            if let Some(stiffness) = known.before.and_then(|(before, _)| before.stiffness.as_ref())
+            {
+                method.take_over(stiffness);
             }
             let mut at =
                 |shape: &[Point]| factored(method.system_at(shape, &masses, inertia, time_step));
@@ -148,9 +166,9 @@ impl ElasticBody {
             mass: masses.iter().sum(),
             masses,
             elasticity,
-            factor,
+            factor: Arc::new(factor),
             free_nodes,
-            free_index,
+            free_index: Arc::new(free_index),
             damping: material.damping,
             mass_damping: material.mass_damping,
             gravity: DVec3::from_array(gravity),
@@ -158,6 +176,18 @@ impl ElasticBody {
             driven: Vec::new(),
             step,
         })
+    }
+
+    /// What another matrix can be made from.
+    pub(super) fn matrix(&self) -> MatrixBefore {
+        MatrixBefore {
+            factor: Arc::clone(&self.factor),
+            free_index: Arc::clone(&self.free_index),
+            stiffness: match &self.elasticity {
+                Elasticity::Nonlinear(method) => Some(method.stiffness()),
+                _ => None,
+            },
+        }
     }
 
     /// Goes on in the memory for solves of a body that is gone.
@@ -193,6 +223,11 @@ impl ElasticBody {
     /// Order in which the free nodes are eliminated.
     pub(crate) fn order(&self) -> &[u32] {
         &self.factor.order().nodes
+    }
+
+    /// The free nodes in that order.
+    pub(in crate::body) fn order_of_nodes(&self) -> impl Iterator<Item = u32> {
+        self.order().iter().map(|&place| self.free_nodes[place as usize])
     }
 
     pub(crate) fn factor_stats(&self) -> FactorStats {

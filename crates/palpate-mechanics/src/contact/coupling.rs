@@ -90,10 +90,10 @@ impl Coupling {
         self.contacts.clear();
     }
 
-    /// Gives up what it knows of the body, which is another one now.
-    pub(super) fn forget(&mut self) {
+    /// Goes on with another body, between some nodes of which the compliance is known.
+    pub(super) fn change_body(&mut self, compliance: NodeCompliance) {
         self.contacts.clear();
-        self.nodes.forget();
+        self.nodes.change_body(compliance);
     }
 
     /// Adds a contact; returns its place.

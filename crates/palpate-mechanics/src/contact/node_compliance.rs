@@ -17,7 +17,7 @@ const TOGETHER: usize = 8;
 /// Displacements of contact nodes under unit forces on contact nodes, in the body's frame. Nodes keep
 /// their slots from step to step, so that only products with new ones are made.
 #[derive(Debug, Default)]
-pub(super) struct NodeCompliance {
+pub(crate) struct NodeCompliance {
     /// That of the half solutions that were multiplied; `None` before there were any.
     version: Option<u64>,
     slot_of: Vec<u32>,
@@ -39,7 +39,7 @@ pub(super) struct NodeCompliance {
 
 impl NodeCompliance {
     /// Takes in `nodes`, whose half solutions are prepared in `cache`.
-    pub(super) fn gather(&mut self, body: &ElasticBody, cache: &ComplianceCache, nodes: &[u32]) {
+    pub(crate) fn gather(&mut self, body: &ElasticBody, cache: &ComplianceCache, nodes: &[u32]) {
         self.slot_of.resize(body.masses().len(), NONE);
         let limit = nodes.len() + (SPARE * nodes.len() as f64) as usize;
         let outdated = self.version != Some(cache.version());
@@ -71,11 +71,15 @@ impl NodeCompliance {
         }
     }
 
-    /// Gives up all slots: the body is another one now.
-    pub(super) fn forget(&mut self) {
-        self.version = None;
-        self.slot_of.clear();
-        self.nodes.clear();
+    /// Goes on with that of another body, in the same memory where it is not known yet.
+    pub(super) fn change_body(&mut self, other: Self) {
+        if other.version.is_some() {
+            *self = other;
+        } else {
+            self.version = None;
+            self.slot_of.clear();
+            self.nodes.clear();
+        }
     }
 
     /// Gives up all slots and makes room for `count` and a few more.

@@ -15,7 +15,6 @@ use rayon::prelude::*;
 
 use super::coupling::{Corners, Coupling};
 use super::filter::Candidate;
-#[cfg(test)]
 use super::node_compliance::NodeCompliance;
 use super::side;
 use crate::body::{ElasticBody, MovingBody};
@@ -109,10 +108,8 @@ impl Problem {
     ) {
         self.bodies.resize_with(body_count, BodyPart::default);
         for (index, part) in self.bodies.iter_mut().enumerate() {
-            for &node in &part.nodes {
-                part.is_contact[node as usize] = false;
-            }
             part.nodes.clear();
+            part.is_contact.clear();
             part.is_contact.resize(body(index).positions.len(), false);
         }
         let mut add = |index: usize, node: u32, weight: f64| {
@@ -138,18 +135,18 @@ impl Problem {
         }
     }
 
-    /// Forgets a body's nodes and compliance.
-    pub(crate) fn forget_body(&mut self, body: usize) {
+    /// Goes on with another body, between some nodes of which the compliance is known; contacts are likely to
+    /// move `nodes`.
+    pub(crate) fn change_body(&mut self, body: usize, compliance: NodeCompliance, nodes: Vec<u32>) {
         if let Some(part) = self.bodies.get_mut(body) {
-            part.nodes.clear();
-            part.is_contact.clear();
-            part.coupling.forget();
+            part.nodes = nodes;
+            part.coupling.change_body(compliance);
         }
     }
 
-    /// Nodes of a body that contacts of this step or the last one can move, ascending.
+    /// Nodes of a body that contacts of this step or the last one can move, ascending; none before the first.
     pub(crate) fn nodes(&self, body: usize) -> &[u32] {
-        &self.bodies[body].nodes
+        self.bodies.get(body).map_or(&[], |part| &part.nodes)
     }
 
     /// Writes the equations of the candidates. The compliance of all nodes must be prepared.

@@ -7,6 +7,7 @@ use super::Contact;
 use super::filter::{BodyView, Candidate, Detected, Filter};
 use super::gauss_seidel::{Effort, GaussSeidel, SolveCost};
 use super::last_forces::LastForces;
+use super::node_compliance::NodeCompliance;
 use super::problem::{Problem, expected_displacement, step_displacement};
 use super::side;
 use crate::body::MovingBody;
@@ -235,9 +236,9 @@ impl Response {
         self.filter = Filter::new(attached);
     }
 
-    /// Forgets what it remembers of a body's response: the body has changed.
-    pub(crate) fn forget_body(&mut self, body: usize) {
-        self.problem.forget_body(body);
+    /// Goes on with another body: see [`Problem::change_body`].
+    pub(crate) fn change_body(&mut self, body: usize, compliance: NodeCompliance, nodes: Vec<u32>) {
+        self.problem.change_body(body, compliance, nodes);
         self.spare.clear();
     }
 

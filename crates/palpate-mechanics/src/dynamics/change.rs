@@ -2,17 +2,67 @@
 
 use std::sync::Arc;
 
+use palpate_geometry::Point;
 use palpate_model::{MeshChange, Model};
 
 use super::{Dynamics, attach, check_orders};
-use crate::body::{Known, MovingBody};
+use crate::body::{BodyBasis, Known, MovingBody};
+use crate::contact::node_compliance::NodeCompliance;
 use crate::contact::{ContactParameters, Surface};
 use crate::error::MechanicsError;
 use crate::state::{BodyState, ContactForce, State};
 
+/// A body after a change of its mesh, made from what no step changes: it may be made while steps are taken.
+pub struct ChangedBody {
+    body: MovingBody,
+    parameters: ContactParameters,
+    surface: Surface,
+    compliance: NodeCompliance,
+}
+
+impl ChangedBody {
+    /// Makes what becomes of body `index` by `change`, in steps of `time_step` [s]: `model` is the model after the
+    /// change, `basis` what the body was. Its responses to contact where it was touched are solved for.
+    ///
+    /// # Errors
+    /// If the body cannot be simulated.
+    pub fn new(
+        model: &Model,
+        index: usize,
+        change: &MeshChange,
+        basis: &BodyBasis,
+        time_step: f64,
+    ) -> Result<Self, MechanicsError> {
+        let mut made = Self::make(model, index, change, basis, time_step)?;
+        let nodes = made.body.prepare_as_before(basis, change);
+        if let Some(elastic) = made.body.elastic() {
+            made.compliance.gather(elastic, &made.body.compliance, &nodes);
+        }
+        Ok(made)
+    }
+
+    fn make(
+        model: &Model,
+        index: usize,
+        change: &MeshChange,
+        basis: &BodyBasis,
+        time_step: f64,
+    ) -> Result<Self, MechanicsError> {
+        let body = &model.bodies[index];
+        let parameters = ContactParameters::new(index, body)?;
+        let gravity = model.gravity;
+        Ok(Self {
+            body: MovingBody::after(index, body, change, gravity, time_step, basis)?,
+            parameters,
+            surface: Surface::new(&body.mesh),
+            compliance: NodeCompliance::default(),
+        })
+    }
+}
+
 impl Dynamics {
     /// Goes on with a body whose mesh was changed: `model` is the model after the change, `change` what
-    /// became of the mesh of body `index`. Only that body's matrix is made anew.
+    /// became of the mesh of body `index`. Only that body's matrix is made anew, where the change reaches.
     ///
     /// Contact forces of the last step, with which the next one begins, stay at the nodes that are
     /// left; [`Dynamics::contacts`] is empty until then. Springs go on pulling the copy of their node
@@ -29,30 +79,68 @@ impl Dynamics {
         index: usize,
         change: &MeshChange,
     ) -> Result<Vec<u64>, MechanicsError> {
-        assert_eq!(model.bodies.len(), self.body_count(), "the same bodies");
-        let body = &model.bodies[index];
-        let parameters = ContactParameters::new(index, body)?;
-        let time_step = self.options.time_step;
-        let changed = self.body(index).changed(body, change, model.gravity, time_step)?;
-        let copies = first_copies(self.positions(index).len(), change);
+        let (basis, time_step) = (self.basis(index), self.options.time_step);
+        let changed = ChangedBody::make(model, index, change, &basis, time_step)?;
+        let (released, before) = self.replace_body(changed, model, change);
+        self.body_mut(index).take_memory(before);
+        Ok(released)
+    }
 
+    /// What body `index` after a change can be made from; see [`ChangedBody::new`].
+    pub fn basis(&self, index: usize) -> BodyBasis {
+        self.body(index).basis(self.response.problem().nodes(index))
+    }
+
+    /// The shape of body `index`, in its frame [m], whose stiffness its next matrix should be made of; empty: that
+    /// at rest. Near what it is made of now that one is kept, so that the factor can be.
+    pub fn next_stiff_shape(&self, index: usize) -> Vec<Point> {
+        let body = self.body(index);
+        body.elastic().map_or_else(Vec::new, |elastic| elastic.next_stiff_shape(&body.positions))
+    }
+
+    /// Goes on with a body that was made for `change`, as [`Self::change_body`]: all but the time that the
+    /// matrix and the responses take.
+    ///
+    /// # Panics
+    /// If the model has another number of bodies, or the change is not one of the body's mesh.
+    pub fn go_on_with(
+        &mut self,
+        changed: ChangedBody,
+        model: &Model,
+        change: &MeshChange,
+    ) -> Vec<u64> {
+        self.replace_body(changed, model, change).0
+    }
+
+    /// Also returns what was there before.
+    fn replace_body(
+        &mut self,
+        changed: ChangedBody,
+        model: &Model,
+        change: &MeshChange,
+    ) -> (Vec<u64>, MovingBody) {
+        assert_eq!(model.bodies.len(), self.body_count(), "the same bodies");
+        let ChangedBody { mut body, parameters, surface, compliance } = changed;
+        let index = body.index;
+        body.move_as(self.body(index), change);
+        let likely = body.likely_nodes(self.response.problem().nodes(index), change);
+        self.response.change_body(index, compliance, likely);
+        let copies = first_copies(self.positions(index).len(), change);
         let contacts: Vec<ContactForce> = self.response.last().forces().to_vec();
         let contacts: Vec<ContactForce> =
             contacts.into_iter().filter_map(|contact| moved(contact, index, &copies)).collect();
         let released = self.ties.change_body(index as u32, |node| copies[node as usize]);
-        let before = std::mem::replace(self.body_mut(index), changed);
-        self.body_mut(index).take_memory(before);
+        let before = std::mem::replace(self.body_mut(index), body);
         self.drives.change_body(index as u32, |node| copies[node as usize]);
         self.apply_drives(index);
-        self.surfaces[index] = Surface::new(&body.mesh);
+        self.surfaces[index] = surface;
         self.parameters[index] = parameters;
-        self.response.forget_body(index);
         self.ties.detach();
         attach(&mut self.ties, model, &self.parameters, &self.surfaces);
         self.response.set_attached(self.ties.attached_nodes());
         self.set_contact_forces(&contacts);
         self.response.restore(&contacts);
-        Ok(released)
+        (released, before)
     }
 
     /// Goes on in a state of another model: bodies with the very mesh (the same `Arc`) of the body with

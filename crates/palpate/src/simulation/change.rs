@@ -8,6 +8,7 @@ use palpate_cutting::{Blade, CutOptions, CutReport};
 use palpate_mechanics::{Dynamics, DynamicsOptions, State};
 use palpate_model::{MeshChange, Model};
 
+use super::live::{LiveCuts, with_change};
 use super::{Simulation, SimulationError, SimulationOptions};
 use crate::scene_cuts::{BodyToCut, cut_bodies};
 
@@ -52,6 +53,7 @@ pub struct Snapshot {
     pub(crate) model: Arc<Model>,
     pub(crate) state: State,
     pub(crate) pending: PendingFaces,
+    pub(crate) live: LiveCuts,
 }
 
 /// For each body the faces that a cut has reached and not opened; the next one goes on with them. Bodies
@@ -106,11 +108,12 @@ impl Simulation {
         }
         let report = self.apply(changes, start)?;
         self.pending = pending;
+        self.begin_live_cuts_anew();
         Ok(report)
     }
 
     /// Shortest edge [m] of the parts of a body's tetrahedra.
-    fn min_edge(&self, body: usize, options: &CutOptions) -> f64 {
+    pub(super) fn min_edge(&self, body: usize, options: &CutOptions) -> f64 {
         options.min_edge.unwrap_or_else(|| {
             let first = self.initial.model.bodies.get(body);
             let mesh = &first.unwrap_or(&self.model.bodies[body]).mesh;
@@ -140,6 +143,7 @@ impl Simulation {
         let change = BodyChange { body, change, report: None, released: Vec::new() };
         let report = self.apply(vec![change], start)?;
         self.forget_pending(body);
+        self.begin_live_cuts_anew();
         Ok(report)
     }
 
@@ -167,7 +171,13 @@ impl Simulation {
                 faces.clear();
             }
         }
-        self.go_on(&Snapshot { model: Arc::new(model), state, pending })?;
+        let mut live = self.live.clone();
+        live.follow(&parts.iter().map(|(old, change)| (*old, Some(change))).collect::<Vec<_>>());
+        let snapshot =
+            Snapshot { model: Arc::new(model), state, pending, live: LiveCuts::default() };
+        self.go_on(&snapshot)?;
+        self.live = live;
+        self.begin_live_cuts_anew();
         Ok(parts)
     }
 
@@ -203,6 +213,9 @@ impl Simulation {
         }
         times.detection = begin.elapsed();
         self.set_model(model);
+        for each in &changes {
+            self.live.follow(&with_change(self.model.bodies.len(), each));
+        }
         times.total = start.elapsed();
         Ok(ChangeReport { bodies: changes, times })
     }
@@ -215,7 +228,7 @@ impl Simulation {
         self.scene.exchange(&meshes, &model.structure)?;
         self.set_model(Arc::clone(model));
         self.pending.clone_from(&snapshot.pending);
-        Ok(())
+        self.set_live_cuts(&snapshot.live)
     }
 }
 

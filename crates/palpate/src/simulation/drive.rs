@@ -68,6 +68,7 @@ impl Simulation {
         let change = MeshChange::identity(&model.bodies[body].mesh);
         self.dynamics.change_body(&model, body, &change)?;
         self.set_model(Arc::new(model));
+        self.begin_live_cuts_anew();
         Ok(())
     }
 }

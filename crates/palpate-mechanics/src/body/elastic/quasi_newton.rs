@@ -9,7 +9,7 @@ use std::sync::Arc;
 use glam::DVec3;
 use palpate_geometry::Point;
 use palpate_model::{Body, Mesh};
-use palpate_solver::BlockMatrix;
+use palpate_solver::{BlockMatrix, Cholesky, Precision};
 
 use super::system::SystemMatrix;
 use super::{ElasticBody, Elasticity, FIXED};
@@ -35,6 +35,8 @@ const SLOW: u32 = 6;
 /// The same when a node has moved by more than this part of the body's radius since, apart from the
 /// body's motion as a whole: slow processes need few iterations in each of very many steps.
 const DEFORMED: f64 = 0.1;
+/// Part of that from which on an A that is made for another reason takes the present shape.
+const SOON: f64 = 0.5;
 /// A move went too far when the residual along it has turned round and is more than this part of what it was;
 /// it is shortened so many times at most, and not below this part of it at a time.
 const OVERSHOT: f64 = 0.5;
@@ -60,7 +62,7 @@ pub(super) struct QuasiNewton {
     scratch: Vec<[f64; 3]>,
     pairs: Vec<Pair>,
     /// Stiffness, and A made of it, when the shape has changed.
-    stiffness: BlockMatrix,
+    stiffness: Arc<BlockMatrix>,
     system: SystemMatrix,
     /// Nodes between which the stiffness is not known although it is elsewhere; empty: nothing is known.
     unknown: Vec<bool>,
@@ -77,6 +79,13 @@ pub(super) struct QuasiNewton {
     longest: f64,
 }
 
+/// A stiffness, and the mesh that it is of.
+#[derive(Clone, Debug)]
+pub(in crate::body) struct StiffnessBefore {
+    mesh: Arc<Mesh>,
+    stiffness: Arc<BlockMatrix>,
+}
+
 /// A move s of the free nodes and the change y of the residual, its sign turned.
 #[derive(Default)]
 struct Pair {
@@ -90,7 +99,7 @@ struct Pair {
 impl QuasiNewton {
     pub(super) fn new(body: &Body, free_index: &[u32]) -> Self {
         let tissue = tissue_of(body, VolumeAveraging::Automatic);
-        let stiffness = BlockMatrix::zeros(Arc::clone(tissue.pattern()));
+        let stiffness = Arc::new(BlockMatrix::zeros(Arc::clone(tissue.pattern())));
         let system = SystemMatrix::new(&stiffness, free_index);
         let node_count = free_index.len();
         let free_count = free_index.iter().filter(|&&place| place != FIXED).count();
@@ -132,24 +141,30 @@ impl QuasiNewton {
         let x = if shape.is_empty() { self.mesh.nodes() } else { shape };
         self.tissue.begin_step(x, time_step);
         let unknown = std::mem::take(&mut self.unknown);
+        let stiffness = Arc::make_mut(&mut self.stiffness);
         if unknown.is_empty() {
-            self.stiffness.blocks_mut().fill([[0.0; 3]; 3]);
-            self.tissue.add_stiffness(x, &mut self.stiffness);
+            stiffness.blocks_mut().fill([[0.0; 3]; 3]);
+            self.tissue.add_stiffness(x, stiffness);
         } else {
-            self.tissue.add_stiffness_between(&unknown, x, &mut self.stiffness);
+            self.tissue.add_stiffness_between(&unknown, x, stiffness);
         }
         self.system.fill(&self.stiffness, masses, inertia, 1.0)
     }
 
+    /// The stiffness that A is made of, for a body with another mesh.
+    pub(super) fn stiffness(&self) -> StiffnessBefore {
+        StiffnessBefore { mesh: Arc::clone(&self.mesh), stiffness: Arc::clone(&self.stiffness) }
+    }
+
     /// Takes over what is known of the stiffness from before a change of the mesh. The next A must be of
     /// the shape that the last one was before.
-    pub(super) fn take_over(&mut self, before: &Self) {
+    pub(super) fn take_over(&mut self, before: &StiffnessBefore) {
         if self.tissue.averages() {
             return;
         }
         let Some(changed) = changed_nodes(&before.mesh, &self.mesh) else { return };
         let (old, new) = (&before.stiffness, Arc::clone(self.stiffness.pattern()));
-        let blocks = self.stiffness.blocks_mut();
+        let blocks = Arc::make_mut(&mut self.stiffness).blocks_mut();
         for (col, &col_changed) in changed.iter().enumerate() {
             for (index, &row) in new.range(col).zip(new.column(col)) {
                 if !(col_changed && changed[row as usize]) {
@@ -220,7 +235,7 @@ impl ElasticBody {
     pub(in crate::body) fn refresh_if_slow(&mut self, x: &[Point]) -> bool {
         match std::mem::take(&mut self.elasticity) {
             Elasticity::Nonlinear(mut method) => {
-                let due = method.effort >= SLOW || self.is_deformed(&method, x);
+                let due = method.effort >= SLOW || self.change_of_shape(&method, x) > DEFORMED;
                 let changed = due && {
                     method.x.clear();
                     method.x.extend(self.arms_of(x).map(|arm| arm.to_array()));
@@ -239,15 +254,26 @@ impl ElasticBody {
         }
     }
 
-    /// Whether positions `x` differ much in shape from those that A is made of.
-    fn is_deformed(&self, method: &QuasiNewton, x: &[Point]) -> bool {
-        let change = if method.stiff_shape.is_empty() {
+    /// The shape that an A which is made anew in any case should be of: the one that it is of, or that of
+    /// positions `x` where the body is on the way to need it.
+    pub(crate) fn next_stiff_shape(&self, x: &[Point]) -> Vec<Point> {
+        match &self.elasticity {
+            Elasticity::Nonlinear(method) if self.change_of_shape(method, x) > SOON * DEFORMED => {
+                self.arms_of(x).map(|arm| arm.to_array()).collect()
+            }
+            Elasticity::Nonlinear(method) => method.stiff_shape.clone(),
+            _ => Vec::new(),
+        }
+    }
+
+    /// How much positions `x` differ in shape from those that A is made of.
+    fn change_of_shape(&self, method: &QuasiNewton, x: &[Point]) -> f64 {
+        if method.stiff_shape.is_empty() {
             largest_change(self.arms_of(x), self.rest.iter().copied())
         } else {
             let shape = method.stiff_shape.iter().map(|&arm| DVec3::from_array(arm));
             largest_change(self.arms_of(x), shape)
-        };
-        change > DEFORMED
+        }
     }
 
     /// Makes A of the stiffness of a shape ([`QuasiNewton::system_at`]); true if A has changed.
@@ -260,7 +286,13 @@ impl ElasticBody {
         let (inertia, time_step) = (self.inertia(), self.time_step);
         let mut factored = |shape: &[Point]| {
             let system = method.system_at(shape, &self.masses, inertia, time_step);
-            self.factor.refactor(system).is_ok()
+            if let Some(factor) = Arc::get_mut(&mut self.factor) {
+                return factor.refactor(system).is_ok();
+            }
+            // What a cut that is on its way is made from stays as it is.
+            let order = self.factor.order().clone();
+            let made = Cholesky::in_order(system, Precision::Single, order);
+            made.map(|factor| self.factor = Arc::new(factor)).is_ok()
         };
         let factored = factored(shape) || factored(&[]);
         debug_assert!(factored, "that at rest was factored when the body was made");
