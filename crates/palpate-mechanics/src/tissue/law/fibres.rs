@@ -16,7 +16,7 @@ use super::neo_hookean::NeoHookean;
 use super::{Directions, ElementLaw, FibreParameters, FibreTangent, Parameters};
 
 /// e^40 = 2e17: far beyond what any fibre survives.
-const LARGEST_EXPONENT: f64 = 40.0;
+pub(in super::super) const LARGEST_EXPONENT: f64 = 40.0;
 
 #[derive(Clone, Copy)]
 pub(in super::super) struct HolzapfelGasserOgden<const FAMILIES: usize> {
