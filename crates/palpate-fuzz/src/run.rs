@@ -11,7 +11,7 @@ use palpate_testing::peak_of;
 use crate::mutate::mutated;
 use crate::random::Random;
 use crate::targets::Target;
-use crate::watchdog::Watchdog;
+use crate::watchdog::{Watchdog, computed};
 
 /// What is wrong with the answer to an input.
 #[derive(Debug)]
@@ -41,7 +41,7 @@ pub(crate) struct Fuzzer {
     told: BTreeSet<String>,
     /// Inputs tried.
     pub(crate) tried: usize,
-    /// The input that took longest, and how long.
+    /// The input that was computed at for longest, and how long.
     pub(crate) slowest: (Duration, Vec<u8>),
 }
 
@@ -143,10 +143,11 @@ impl Fuzzer {
 
     fn look_at(&mut self, input: &[u8], seed: u64, tell: &mut dyn FnMut(&str)) {
         self.tried += 1;
-        let start = Instant::now();
+        let start = computed();
         let outcome = self.try_input(input);
-        if start.elapsed() > self.slowest.0 {
-            self.slowest = (start.elapsed(), input.to_vec());
+        let time = computed().saturating_sub(start);
+        if time > self.slowest.0 {
+            self.slowest = (time, input.to_vec());
         }
         match outcome {
             Ok(outcome) => {
