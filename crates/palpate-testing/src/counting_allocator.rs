@@ -53,6 +53,12 @@ pub fn allocations() -> usize {
     COUNT.load(Ordering::Relaxed)
 }
 
+/// Bytes that are allocated now, by all threads.
+#[must_use]
+pub fn bytes_in_use() -> usize {
+    NOW.load(Ordering::Relaxed)
+}
+
 /// The most bytes that were allocated at once during `action` beyond those before it, of all threads.
 pub fn peak_of<T>(action: impl FnOnce() -> T) -> (T, usize) {
     let before = NOW.load(Ordering::Relaxed);

@@ -5,4 +5,4 @@ mod boxes;
 mod counting_allocator;
 
 pub use boxes::{Fastest, box_of_cells};
-pub use counting_allocator::{Counting, allocations, peak_of};
+pub use counting_allocator::{Counting, allocations, bytes_in_use, peak_of};

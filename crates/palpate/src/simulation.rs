@@ -260,6 +260,7 @@ impl Simulation {
             }
             other => other,
         }?;
+        self.give_up_unused();
         report.opened = self.take_opened();
         report.times.change = change;
         report.times.total += change;

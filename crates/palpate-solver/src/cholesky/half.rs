@@ -207,6 +207,8 @@ impl<T: Real> PackedFactor<T> {
             let last = paths.of_node[place as usize];
             let length = paths.parts[last as usize].1 as usize;
             half.values.clear();
+            // There are many of them: none takes more than it needs.
+            half.values.reserve_exact(3 * length);
             half.values.resize(3 * length, 0.0);
             for s in paths.up(last) {
                 let begin = paths.parts[s as usize].0 as usize;

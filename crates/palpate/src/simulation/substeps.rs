@@ -13,6 +13,10 @@ use crate::mechanics::MechanicsError;
 /// Most smaller steps that a failed one is divided into.
 const MOST: u32 = 64;
 
+/// Steps in a row without smaller ones after which the matrices for these are given up: they take as much memory
+/// as those of whole steps, and as long to make again as a few steps take.
+const LAPSE: u64 = 240;
+
 /// What to do about a step that fails.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 pub enum Substeps {
@@ -30,6 +34,8 @@ pub(super) struct Finer {
     model: Arc<Model>,
     substeps: u32,
     dynamics: Dynamics,
+    /// The last step that it was used for.
+    step: u64,
 }
 
 impl Simulation {
@@ -60,6 +66,7 @@ impl Simulation {
             self.dynamics.take_over(&finer.dynamics)?;
             Ok(report)
         });
+        finer.step = self.dynamics.step_count();
         self.finer = Some(finer);
         let report = taken?;
         let (step, time) = (self.dynamics.step_count(), self.dynamics.time());
@@ -95,7 +102,15 @@ impl Simulation {
         }
         let time_step = self.options.time_step / f64::from(substeps);
         let dynamics = self.dynamics.with_time_step(&self.model, time_step)?;
-        Ok(Box::new(Finer { model: Arc::clone(&self.model), substeps, dynamics }))
+        let step = self.dynamics.step_count();
+        Ok(Box::new(Finer { model: Arc::clone(&self.model), substeps, dynamics, step }))
+    }
+
+    /// Gives the matrices for smaller steps up when none was needed for long.
+    pub(super) fn give_up_unused(&mut self) {
+        let step = self.dynamics.step_count();
+        let unused = |finer: &mut Box<Finer>| step.abs_diff(finer.step) >= LAPSE;
+        drop(self.finer.take_if(unused));
     }
 }
 
