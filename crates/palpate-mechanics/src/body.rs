@@ -18,7 +18,7 @@ use crate::error::MechanicsError;
 use crate::state::BodyState;
 pub use change::BodyBasis;
 use elastic::MatrixBefore;
-pub(crate) use elastic::{ElasticBody, Known};
+pub(crate) use elastic::{ElasticBody, Known, check_fixed_nodes};
 pub(crate) use rigid::RigidBody;
 
 /// A body in motion. All arrays have one entry per node.

@@ -17,7 +17,7 @@ use palpate_model::Model;
 use palpate_solver::FactorStats;
 use rayon::prelude::*;
 
-use crate::body::{BodyKind, Known, MovingBody, first_not_finite};
+use crate::body::{BodyKind, Known, MovingBody, check_fixed_nodes, first_not_finite};
 use crate::contact::filter::{BodyView, Candidate, Detected};
 use crate::contact::response::Response;
 use crate::contact::{Contact, ContactParameters, Surface};
@@ -737,6 +737,7 @@ fn check_orders(model: &Model, state: &State) -> Result<(), MechanicsError> {
         return Err(MechanicsError::WrongBodyCount { expected, found });
     }
     for (index, (body, saved)) in model.bodies.iter().zip(&state.bodies).enumerate() {
+        check_fixed_nodes(index, body)?;
         let count = body.mesh.nodes().len();
         if !saved.stiff_shape.is_empty() {
             check_array(index, count, &saved.stiff_shape, "the shape")?;

@@ -133,6 +133,19 @@ pub enum MechanicsError {
         /// Nodes of the body.
         nodes: usize,
     },
+    /// Fixed nodes that are not in ascending order, each once.
+    #[error(
+        "fixed_nodes of body {body}: {node} comes after {before}; give them in ascending order, \
+         each once"
+    )]
+    FixedOrder {
+        /// Index of the body.
+        body: usize,
+        /// The first node that is not greater than the one before it.
+        node: u32,
+        /// That one.
+        before: u32,
+    },
     /// A spring on a node that nothing moves.
     #[error("node {node} of body {body} is fixed or rigid: it cannot be pulled")]
     CannotMove {

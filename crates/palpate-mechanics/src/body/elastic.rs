@@ -31,6 +31,7 @@ use crate::error::MechanicsError;
 use driven::Driven;
 use quasi_newton::{QuasiNewton, StiffnessBefore};
 use step::Step;
+pub(crate) use system::check_fixed_nodes;
 use system::{SystemMatrix, check_material, in_body_numbering, linear_stiffness, lumped_masses};
 
 const FIXED: u32 = u32::MAX;
@@ -103,6 +104,7 @@ impl ElasticBody {
         known: Known,
     ) -> Result<Self, MechanicsError> {
         check_material(index, body)?;
+        check_fixed_nodes(index, body)?;
         let mesh = &body.mesh;
         let (nodes, tetrahedra) = (mesh.nodes(), mesh.tetrahedra());
         let name = || body.name.clone();

@@ -3,7 +3,7 @@
 use palpate_mechanics::{Cause, ContactForce, Dynamics, DynamicsOptions, MechanicsError};
 use palpate_model::Body;
 
-use crate::world::{World, box_mesh, floor, model, soft};
+use crate::world::{GRAVITY, World, box_mesh, floor, model, soft};
 
 fn refuse(body: Body) -> MechanicsError {
     match Dynamics::new(&model(vec![body], 9.81), DynamicsOptions::default()) {
@@ -35,6 +35,28 @@ fn bodies_that_cannot_be_simulated_are_named() {
         let error = refuse(body);
         assert!(matches!(error, MechanicsError::BadParameter { body: 0, .. }), "{error}");
         assert!(error.to_string().contains("organ"), "{error}");
+    }
+}
+
+#[test]
+fn fixed_nodes_exist_and_ascend() {
+    let body = |fixed_nodes: &[u32]| Body {
+        fixed_nodes: fixed_nodes.to_vec(),
+        ..soft("cube", &box_mesh([1, 1, 1], [1.0; 3], |x| x), 1e4, 0.0)
+    };
+    let state = Dynamics::new(&model(vec![body(&[])], GRAVITY), DynamicsOptions::default());
+    let state = state.unwrap().state();
+    for (fixed, expected) in [
+        (&[1, 8][..], MechanicsError::NoSuchNode { body: 0, node: 8, nodes: 8 }),
+        (&[3, 2], MechanicsError::FixedOrder { body: 0, node: 2, before: 3 }),
+        (&[0, 5, 5], MechanicsError::FixedOrder { body: 0, node: 5, before: 5 }),
+        (&[7; 20], MechanicsError::FixedOrder { body: 0, node: 7, before: 7 }),
+    ] {
+        let model = model(vec![body(fixed)], GRAVITY);
+        let error = |result: Result<Dynamics, MechanicsError>| result.err().expect("refused");
+        let options = DynamicsOptions::default();
+        assert_eq!(error(Dynamics::new(&model, options)), expected);
+        assert_eq!(error(Dynamics::with_state(&model, options, &state)), expected);
     }
 }
 

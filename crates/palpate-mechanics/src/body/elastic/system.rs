@@ -112,6 +112,20 @@ pub(super) fn in_body_numbering(error: FactorError, free_nodes: &[u32]) -> Facto
     }
 }
 
+/// Whether the fixed nodes exist and ascend.
+pub(crate) fn check_fixed_nodes(index: usize, body: &Body) -> Result<(), MechanicsError> {
+    let nodes = body.mesh.nodes().len();
+    if let Some(pair) = body.fixed_nodes.windows(2).find(|pair| pair[0] >= pair[1]) {
+        return Err(MechanicsError::FixedOrder { body: index, node: pair[1], before: pair[0] });
+    }
+    match body.fixed_nodes.last() {
+        Some(&last) if last as usize >= nodes => {
+            Err(MechanicsError::NoSuchNode { body: index, node: last as usize, nodes })
+        }
+        _ => Ok(()),
+    }
+}
+
 pub(super) fn check_material(index: usize, body: &Body) -> Result<(), MechanicsError> {
     check_laws(index, body)?;
     for m in std::iter::once(&body.material).chain(body.regions.iter().map(|(_, m)| m)) {
