@@ -1,13 +1,16 @@
 """A long cut through a kidney of case 2 at rest: how long each frame takes, and where it goes.
 
 A scalpel moves on by a little before every frame; a frame is the cut and the step of 1/60 s. The
-frames before the cut are the usual ones. Afterwards detection with the trees that were kept is
-compared with that of the same simulation loaded from a checkpoint, whose trees are new.
+frames before the cut are the usual ones. The same cut is made twice: live, beside the steps, with
+frames that begin 1/60 s apart as a simulator's do (or later, where one takes longer), and at once,
+before each step. Afterwards detection with the trees that were kept is compared with that of the
+same simulation loaded from a checkpoint, whose trees are new.
 """
 
 from __future__ import annotations
 
 import tempfile
+import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -24,8 +27,15 @@ from palpate.simulation import Simulation
 #: Frames until the bodies are at rest.
 SETTLE = 240
 
-#: How long the frames and their stages took, by row of the report.
+#: Frames before the cut that are measured as the usual ones.
+USUAL = 60
+
+#: Steps until a live cut opens.
+DELAY = 4
+
+#: How long the frames and their stages took, by row of the report: cut at once, and live.
 STAGES = ("cutting", "detection", "mechanics", "step", "frame")
+LIVE_STAGES = ("opening", "step", "frame")
 
 
 @dataclass(frozen=True)
@@ -55,8 +65,12 @@ class Outcome:
     opened: int
     tetrahedra: tuple[int, int]
     usual: Spread
-    #: By stage; ``frame`` is all of it.
+    #: By stage; ``frame`` is all of it. Cut at once, and live.
     while_cutting: dict[str, Spread]
+    while_cutting_live: dict[str, Spread]
+    #: Live frames in which something came apart, and steps until it does.
+    opened_live: int
+    delay: int
     #: Median seconds of refit and traversal after the cuts, by method: with the trees that were
     #: kept, and with new ones.
     kept_and_new: dict[str, tuple[float, float]]
@@ -78,7 +92,7 @@ def run(
     usual: list[float] = []
     for frame in range(SETTLE):
         report = simulation.step()
-        if frame >= SETTLE - 60:
+        if frame >= SETTLE - USUAL:
             usual.append(report.times["total"])
         advance()
     before = len(simulation.model.bodies[index].mesh.tetrahedra)
@@ -86,6 +100,7 @@ def run(
     strokes = [Blade.stroke(edges[frame : frame + 2]) for frame in range(frames)]
     paper = Simulation(model, threads=threads, method="paper")
     paper.restore(simulation.snapshot())
+    opened_live, live = _cut_live(simulation, strokes, advance)
     seconds: dict[str, list[float]] = {stage: [] for stage in STAGES}
     opened = 0
     for stroke in strokes:
@@ -114,18 +129,53 @@ def run(
         tetrahedra=(before, after),
         usual=Spread.of(usual),
         while_cutting={stage: Spread.of(values) for stage, values in seconds.items()},
+        while_cutting_live={stage: Spread.of(values) for stage, values in live.items()},
+        opened_live=opened_live,
+        delay=DELAY,
         kept_and_new=kept_and_new,
     )
     if output is not None:
         output.mkdir(parents=True, exist_ok=True)
         options = {"model": name, "body": body, "frames": frames, "threads": threads}
-        write_json(output / "results.json", "cutting", options, **asdict(outcome), seconds=seconds)
+        write_json(
+            output / "results.json",
+            "cutting",
+            options,
+            **asdict(outcome),
+            seconds=seconds,
+            seconds_live=live,
+        )
         lines: list[dict[str, Any]] = [
-            {stage: seconds[stage][frame] for stage in STAGES} for frame in range(frames)
+            {stage: seconds[stage][frame] for stage in STAGES}
+            | {f"live {stage}": live[stage][frame] for stage in LIVE_STAGES}
+            for frame in range(frames)
         ]
         write_csv(output / "cutting.csv", lines)
         write_text(output / "report.md", *_report(outcome))
     return outcome
+
+
+def _cut_live(
+    simulation: Simulation, strokes: list[Blade], advance: Callable[[], None]
+) -> tuple[int, dict[str, list[float]]]:
+    """Cut beside the steps and go back: frames that open something, and the seconds by stage."""
+    before = simulation.snapshot()
+    seconds: dict[str, list[float]] = {stage: [] for stage in LIVE_STAGES}
+    opened = 0
+    start = time.perf_counter()
+    for frame, stroke in enumerate(strokes):
+        time.sleep(max(0.0, start + frame * simulation.time_step - time.perf_counter()))
+        begin = time.perf_counter()
+        simulation.cut_live(stroke, delay=DELAY)
+        report = simulation.step()
+        seconds["frame"].append(time.perf_counter() - begin)
+        opening = report.stages["change"]
+        seconds["opening"].append(opening)
+        seconds["step"].append(report.times["total"] - opening)
+        opened += any(len(cut) > 0 for cut in report.cuts)
+        advance()
+    simulation.restore(before)
+    return opened, seconds
 
 
 def _detection(simulation: Simulation, threads: int) -> tuple[float, float]:
@@ -152,7 +202,9 @@ def trees(outcome: Outcome) -> list[list[str]]:
 
 def rows(outcome: Outcome) -> list[list[str]]:
     """Stage, median, 99th percentile and worst in words."""
-    named = {"a usual step": outcome.usual, **outcome.while_cutting}
+    named = {"a usual step": outcome.usual}
+    named |= {f"live: {stage}": spread for stage, spread in outcome.while_cutting_live.items()}
+    named |= {f"at once: {stage}": spread for stage, spread in outcome.while_cutting.items()}
     return [
         [name, milliseconds(s.median), milliseconds(s.p99), milliseconds(s.worst)]
         for name, s in named.items()
@@ -171,7 +223,9 @@ def _report(outcome: Outcome) -> tuple[str, ...]:
     return (
         f"# A long cut through {outcome.body} of {outcome.model}",
         f"{outcome.frames} frames of 1/60 s, {outcome.opened} of them open something; {before} "
-        f"tetrahedra become {after}; {outcome.threads} threads.",
+        f"tetrahedra become {after}; {outcome.threads} threads. Live, the same strokes open "
+        f"in {outcome.opened_live} frames, {outcome.delay} steps later or more; one more thread "
+        "prepares them.",
         markdown_table(HEADINGS, rows(outcome)),
         markdown_table(TREES, trees(outcome)),
     )

@@ -61,6 +61,8 @@ pub(super) struct QuasiNewton {
     /// The same before the last move; then the next move.
     scratch: Vec<[f64; 3]>,
     pairs: Vec<Pair>,
+    /// How many of the pairs are known, the first ones.
+    known: usize,
     /// Stiffness, and A made of it, when the shape has changed.
     stiffness: Arc<BlockMatrix>,
     system: SystemMatrix,
@@ -113,6 +115,7 @@ impl QuasiNewton {
             residual: zero(),
             scratch: zero(),
             pairs: (0..MEMORY).map(pair).collect(),
+            known: 0,
             stiffness,
             system,
             unknown: Vec::new(),
@@ -174,6 +177,26 @@ impl QuasiNewton {
             }
         }
         self.unknown = changed;
+    }
+
+    /// Remembers how the residual, before in the scratch memory, has changed by the last move; false where
+    /// it has not turned against it. Contact forces are the same before and after.
+    fn remember_move(&mut self) -> bool {
+        let pair = &mut self.pairs[self.known];
+        for ((y, r), before) in pair.y.iter_mut().zip(&self.residual).zip(&self.scratch) {
+            *y = std::array::from_fn(|k| before[k] - r[k]);
+        }
+        let product = dot(&pair.s, &pair.y);
+        if product <= 0.0 {
+            return false;
+        }
+        pair.rho = product.recip();
+        self.known += 1;
+        if self.known == MEMORY {
+            self.pairs.rotate_left(1);
+            self.known -= 1;
+        }
+        true
     }
 
     /// Farthest that the response to contact may move a node by deformation [m].
@@ -309,7 +332,7 @@ impl ElasticBody {
     ) {
         method.tissue.begin_step(x, self.time_step);
         self.begin_correction(method.mean_edge);
-        method.iterations = 0;
+        (method.iterations, method.known) = (0, 0);
         (method.effort, method.passes) = (0, 1);
         self.relax(method, forces, contact);
         if self.is_unattached() {
@@ -325,15 +348,16 @@ impl ElasticBody {
         self.step.begin_correction(less, &self.free_nodes);
     }
 
-    /// Iterates from the present correction, with care while contact forces are held.
+    /// Iterates from the present correction, with care while contact forces are held. What was learned of
+    /// the tissue under other contact forces of this step still holds: where it is stiffer than A says, each pass
+    /// would go too far anew.
     fn relax(&mut self, method: &mut QuasiNewton, forces: &[Point], contact: Option<&[Point]>) {
         let held = contact.is_some();
         let most = if held { MAX_HELD_ITERATIONS } else { MAX_ITERATIONS };
-        let mut known = 0;
         let mut last = f64::INFINITY;
         self.find_residual(method, forces, contact);
         for iteration in 0..most {
-            let longest = self.next_move(method, known);
+            let longest = self.next_move(method);
             if held && longest > SHRINKING * last {
                 break;
             }
@@ -341,30 +365,14 @@ impl ElasticBody {
             method.effort = method.effort.max(iteration as u32 + 1);
             method.longest = longest;
             last = longest;
-            self.make_move(method, known, longest);
+            self.make_move(method, longest);
             if longest <= TOLERANCE * method.mean_edge {
                 break;
             }
             std::mem::swap(&mut method.scratch, &mut method.residual);
             self.find_residual(method, forces, contact);
-            self.shorten_move(method, known, forces, contact);
-            if iteration + 1 == most {
-                break;
-            }
-            let QuasiNewton { pairs, residual, scratch, .. } = &mut *method;
-            let pair = &mut pairs[known];
-            for ((y, r), before) in pair.y.iter_mut().zip(&*residual).zip(&*scratch) {
-                *y = std::array::from_fn(|k| before[k] - r[k]);
-            }
-            let product = dot(&pair.s, &pair.y);
-            if product > 0.0 {
-                pair.rho = product.recip();
-                known += 1;
-                if known == MEMORY {
-                    pairs.rotate_left(1);
-                    known -= 1;
-                }
-            } else if held {
+            self.shorten_move(method, forces, contact);
+            if !method.remember_move() && held {
                 break;
             }
         }
@@ -375,10 +383,10 @@ impl ElasticBody {
     fn shorten_move(
         &mut self,
         method: &mut QuasiNewton,
-        known: usize,
         forces: &[Point],
         contact: Option<&[Point]>,
     ) {
+        let known = method.known;
         for _ in 0..MAX_SHORTENED {
             let s = &method.pairs[known].s;
             let (before, after) = (dot(s, &method.scratch), dot(s, &method.residual));
@@ -398,8 +406,8 @@ impl ElasticBody {
     }
 
     /// Adds the next move, shortened where it is too long.
-    fn make_move(&mut self, method: &mut QuasiNewton, known: usize, longest: f64) {
-        let s = &mut method.pairs[known].s;
+    fn make_move(&mut self, method: &mut QuasiNewton, longest: f64) {
+        let s = &mut method.pairs[method.known].s;
         let limit = LONGEST_MOVE * method.mean_edge;
         let scale = if longest > limit { limit / longest } else { 1.0 };
         for ((d, s), z) in self.step.correction.iter_mut().zip(s).zip(&method.scratch) {
@@ -481,8 +489,9 @@ impl ElasticBody {
     }
 
     /// Writes the next move to `scratch`; returns its longest part [m].
-    fn next_move(&mut self, method: &mut QuasiNewton, known: usize) -> f64 {
-        let QuasiNewton { residual, scratch, pairs, .. } = method;
+    fn next_move(&mut self, method: &mut QuasiNewton) -> f64 {
+        let QuasiNewton { residual, scratch, pairs, known, .. } = method;
+        let known = *known;
         scratch.copy_from_slice(residual);
         for pair in pairs[..known].iter_mut().rev() {
             pair.alpha = pair.rho * dot(&pair.s, scratch);
