@@ -5,7 +5,7 @@ use palpate_geometry::Point;
 use palpate_model::{Body, FIBRE_FAMILIES, Law as LawName, Material};
 
 use crate::error::MechanicsError;
-use crate::tissue::law::{FibreParameters, Lame, Law, MAX_FAMILIES, Parameters};
+use crate::tissue::law::{Law, MAX_FAMILIES};
 use crate::tissue::{Tissue, TissueInput, VolumeAveraging};
 
 const _: () = assert!(MAX_FAMILIES == FIBRE_FAMILIES, "the mesh holds what the laws read");
@@ -36,7 +36,7 @@ pub(crate) fn tissue_of(body: &Body, averaging: VolumeAveraging) -> Tissue {
     let laws: Vec<Law> = materials
         .iter()
         .flat_map(|material| [1, 2].map(|families| (material, families)))
-        .map(|(material, families)| law_of(material, families))
+        .map(|(material, families)| Law::new(material, families))
         .collect();
     let (mut regions, mut fibres) = (Vec::new(), Vec::new());
     let any_fibres = materials.iter().any(|material| material.law == LawName::HolzapfelGasserOgden);
@@ -62,12 +62,6 @@ pub(crate) fn tissue_of(body: &Body, averaging: VolumeAveraging) -> Tissue {
         viscosity: body.material.damping,
         averaging,
     })
-}
-
-fn law_of(material: &Material, families: usize) -> Law {
-    let Material { law, young, poisson, mooney, k1, k2, kappa, .. } = *material;
-    let fibres = FibreParameters { k1, k2, kappa, families };
-    Law::new(law, Parameters { lame: Lame::new(young, poisson), mooney, fibres })
 }
 
 /// Unit directions of the fibres of a tetrahedron, zero where there is none.

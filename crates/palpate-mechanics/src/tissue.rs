@@ -147,7 +147,7 @@ impl ElementSet {
     fn run_geometric<T: Task>(groups: &[Group], x: &[Point], task: &mut T) {
         let input =
             BatchInput { groups, directions: &[], viscosity: None, pressures: &[], positions: x };
-        let law = law::neo_hookean::NeoHookean::new(&Lame { mu: 1.0, lambda: 0.0 }.into());
+        let law = law::neo_hookean::NeoHookean::from_lame(Lame { mu: 1.0, lambda: 0.0 });
         pulp::Arch::new().dispatch(Pass { law, input, task });
     }
 }

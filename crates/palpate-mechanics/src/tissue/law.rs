@@ -8,6 +8,7 @@ pub(super) mod saint_venant_kirchhoff;
 pub(super) mod viscosity;
 
 pub(super) use palpate_model::Law as Name;
+use palpate_model::Material;
 
 use super::matrix::Matrix;
 use super::principal::PrincipalTangent;
@@ -19,55 +20,42 @@ pub(crate) const MAX_FAMILIES: usize = 2;
 /// Unit fibre directions of a tetrahedron in rest space; laws with fewer read the first ones.
 pub(super) type Directions<R> = [[R; 3]; MAX_FAMILIES];
 
-/// A law with its parameters.
+/// A law as a material asks for it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Law {
-    pub(super) name: Name,
-    pub(super) parameters: Parameters,
-}
-
-/// What laws are made from; each reads what it needs.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Parameters {
-    /// Elasticity at small strain; of the matrix alone where there are fibres.
-    pub(crate) lame: Lame,
-    /// Share of the second invariant in Mooney-Rivlin, 0 to 1.
-    pub(crate) mooney: f64,
-    /// The fibres of Holzapfel-Gasser-Ogden.
-    pub(crate) fibres: FibreParameters,
-}
-
-/// Without fibres, and halfway between the invariants.
-impl From<Lame> for Parameters {
-    fn from(lame: Lame) -> Self {
-        let fibres = FibreParameters { k1: 0.0, k2: 1.0, kappa: 0.0, families: 0 };
-        Self { lame, mooney: 0.5, fibres }
-    }
+    /// Its name, and the parameters that are its own.
+    pub(super) material: Material,
+    /// Elasticity at small strain, of which a part may be taken elsewhere; of the matrix alone where there
+    /// are fibres.
+    lame: Lame,
+    /// Directions per tetrahedron where there are fibres, 1 or 2.
+    families: usize,
 }
 
 impl Law {
     /// # Panics
     /// For the linear law, which is none of single elements.
-    pub(crate) fn new(name: Name, parameters: Parameters) -> Self {
-        assert!(name != Name::Linear, "{name} is no law of single elements");
-        Self { name, parameters }
+    pub(crate) fn new(material: &Material, families: usize) -> Self {
+        assert!(material.law != Name::Linear, "{} is no law of single elements", material.law);
+        let lame = Lame::new(material.young, material.poisson);
+        Self { material: *material, lame, families }
     }
 
     /// Lamé parameters at small strain; of the matrix alone where there are fibres.
     pub(crate) fn lame(&self) -> Lame {
-        self.parameters.lame
+        self.lame
     }
 
     /// The same law with another resistance to change of volume.
     pub(super) fn with_lambda(mut self, lambda: f64) -> Self {
-        self.parameters.lame.lambda = lambda;
+        self.lame.lambda = lambda;
         self
     }
 
     /// Fibre directions that the law reads.
     pub(crate) fn families(&self) -> usize {
-        match self.name {
-            Name::HolzapfelGasserOgden => self.parameters.fibres.families,
+        match self.material.law {
+            Name::HolzapfelGasserOgden => self.families,
             _ => 0,
         }
     }
@@ -90,19 +78,6 @@ impl Lame {
             lambda: young * poisson / ((1.0 + poisson) * (1.0 - 2.0 * poisson)),
         }
     }
-}
-
-/// Parameters of fibres, the same for each family.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct FibreParameters {
-    /// Stiffness at small stretch [Pa].
-    pub(crate) k1: f64,
-    /// How fast they stiffen, greater than 0.
-    pub(crate) k2: f64,
-    /// Dispersion: 0 (parallel) to 1/3 (isotropic).
-    pub(crate) kappa: f64,
-    /// Directions per tetrahedron, 1 or 2.
-    pub(crate) families: usize,
 }
 
 /// A law as the kernel evaluates it.
@@ -146,14 +121,14 @@ macro_rules! with_law {
     ($choice:expr, $law:ident => $body:expr) => {{
         use law::Name;
 
-        let law::Law { name, parameters: p } = &$choice;
-        match name {
-            Name::Corotated => with_law!(@ law::corotated::Corotated, p, $law => $body),
-            Name::SaintVenantKirchhoff => with_law!(@ law::saint_venant_kirchhoff::SaintVenantKirchhoff, p, $law => $body),
-            Name::NeoHookean => with_law!(@ law::neo_hookean::NeoHookean, p, $law => $body),
-            Name::MooneyRivlin => with_law!(@ law::mooney_rivlin::MooneyRivlin, p, $law => $body),
-            Name::HolzapfelGasserOgden if p.fibres.families == 1 => with_law!(@ law::fibres::HolzapfelGasserOgden<1>, p, $law => $body),
-            Name::HolzapfelGasserOgden => with_law!(@ law::fibres::HolzapfelGasserOgden<2>, p, $law => $body),
+        let choice = &$choice;
+        match choice.material.law {
+            Name::Corotated => with_law!(@ law::corotated::Corotated, choice, $law => $body),
+            Name::SaintVenantKirchhoff => with_law!(@ law::saint_venant_kirchhoff::SaintVenantKirchhoff, choice, $law => $body),
+            Name::NeoHookean => with_law!(@ law::neo_hookean::NeoHookean, choice, $law => $body),
+            Name::MooneyRivlin => with_law!(@ law::mooney_rivlin::MooneyRivlin, choice, $law => $body),
+            Name::HolzapfelGasserOgden if choice.families() == 1 => with_law!(@ law::fibres::HolzapfelGasserOgden<1>, choice, $law => $body),
+            Name::HolzapfelGasserOgden => with_law!(@ law::fibres::HolzapfelGasserOgden<2>, choice, $law => $body),
             other => unreachable!("{other} is no law of single elements"),
         }
     }};

@@ -8,7 +8,7 @@
 use super::super::matrix::{self, Matrix};
 use super::super::principal::{OTHERS, PrincipalTangent};
 use super::super::real::Real;
-use super::{Directions, ElementLaw, Lame, Parameters};
+use super::{Directions, ElementLaw, Lame, Law};
 
 #[derive(Clone, Copy)]
 pub(in super::super) struct Corotated {
@@ -16,8 +16,8 @@ pub(in super::super) struct Corotated {
 }
 
 impl Corotated {
-    pub(in super::super) fn new(parameters: &Parameters) -> Self {
-        Self { lame: parameters.lame }
+    pub(in super::super) fn new(law: &Law) -> Self {
+        Self { lame: law.lame }
     }
 }
 

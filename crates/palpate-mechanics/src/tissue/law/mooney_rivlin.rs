@@ -10,7 +10,7 @@
 use super::super::matrix::{self, Matrix};
 use super::super::principal::{OTHERS, PrincipalTangent};
 use super::super::real::Real;
-use super::{Directions, ElementLaw, Parameters};
+use super::{Directions, ElementLaw, Law};
 
 #[derive(Clone, Copy)]
 pub(in super::super) struct MooneyRivlin {
@@ -20,8 +20,8 @@ pub(in super::super) struct MooneyRivlin {
 }
 
 impl MooneyRivlin {
-    pub(in super::super) fn new(&Parameters { lame, mooney, .. }: &Parameters) -> Self {
-        let c01 = 0.5 * lame.mu * mooney;
+    pub(in super::super) fn new(&Law { lame, material, .. }: &Law) -> Self {
+        let c01 = 0.5 * lame.mu * material.mooney;
         let c10 = 0.5 * lame.mu - c01;
         Self { c10, c01, bulk: lame.lambda + 2.0 * c10 }
     }

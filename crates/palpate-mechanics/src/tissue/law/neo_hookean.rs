@@ -10,7 +10,7 @@
 use super::super::matrix::{self, Matrix};
 use super::super::principal::PrincipalTangent;
 use super::super::real::Real;
-use super::{Directions, ElementLaw, Parameters};
+use super::{Directions, ElementLaw, Lame, Law};
 
 #[derive(Clone, Copy)]
 pub(in super::super) struct NeoHookean {
@@ -19,7 +19,11 @@ pub(in super::super) struct NeoHookean {
 }
 
 impl NeoHookean {
-    pub(in super::super) fn new(Parameters { lame, .. }: &Parameters) -> Self {
+    pub(in super::super) fn new(law: &Law) -> Self {
+        Self::from_lame(law.lame)
+    }
+
+    pub(in super::super) fn from_lame(lame: Lame) -> Self {
         Self { shear: 4.0 / 3.0 * lame.mu, bulk: lame.lambda + 5.0 / 6.0 * lame.mu }
     }
 }

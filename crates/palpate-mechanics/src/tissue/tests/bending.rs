@@ -3,11 +3,12 @@
 use std::sync::Arc;
 
 use palpate_geometry::Point;
+use palpate_model::Material;
 use palpate_solver::{BlockMatrix, Cholesky};
 
-use super::super::law::{Lame, Law, Name};
+use super::super::law::{Law, Name};
 use super::super::{Tissue, TissueInput, VolumeAveraging};
-use super::support::{block, inner, moved};
+use super::support::{block, inner, material, moved};
 
 /// Vertical displacement of the upper right corner for E = 1 and a load of 1 per thickness, plane
 /// strain, small displacements, nu = 0.4999: quadratic-linear Taylor-Hood triangles, 8² to 128² cells
@@ -117,7 +118,7 @@ impl Membrane {
 
 #[test]
 fn membranes_of_nearly_incompressible_tissue_bend() {
-    let law = Law::new(Name::NeoHookean, Lame::new(1.0, 0.4999).into());
+    let law = Law::new(&Material { young: 1.0, poisson: 0.4999, ..material(Name::NeoHookean) }, 1);
     let deflection = |cells: usize, averaging: VolumeAveraging| {
         let membrane = Membrane::new(cells);
         membrane.solve(law, averaging)[membrane.corner][1] / LOAD / EXACT

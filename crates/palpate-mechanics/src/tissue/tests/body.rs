@@ -4,12 +4,15 @@ use std::sync::Arc;
 
 use glam::{DMat3, DVec3};
 use palpate_geometry::Point;
+use palpate_model::Material;
 use palpate_solver::BlockMatrix;
 use proptest::prelude::*;
 
-use super::super::law::{Lame, Law, Name};
+use super::super::law::{Law, Name};
 use super::super::{Inverted, Tissue, TissueInput, VolumeAveraging, von_mises};
-use super::support::{TestBody, YOUNG, block, inner, laws, matrix, moved, norm, stress};
+use super::support::{
+    TestBody, YOUNG, block, inner, law_named, laws, material, matrix, moved, norm, stress,
+};
 
 fn forces(tissue: &mut Tissue, x: &[Point]) -> Vec<Point> {
     let mut forces = vec![[0.0; 3]; x.len()];
@@ -52,7 +55,7 @@ impl Case {
         if self.stiff {
             pair[0] = pair[0].with_lambda(60.0 * pair[0].lame().mu);
         }
-        TestBody::new(pair, self.viscosity, &self.shift)
+        TestBody::new(&pair, self.viscosity, &self.shift)
     }
 
     /// The tissue in a step, and the positions.
@@ -201,7 +204,7 @@ proptest! {
         ratio in prop::sample::select(vec![2.0, 60.0, 5_000.0]),
     ) {
         let law = laws()[choice].with_lambda(ratio * laws()[choice].lame().mu);
-        let body = TestBody::new([law; 2], 0.0, &shift);
+        let body = TestBody::new(&[law; 2], 0.0, &shift);
         let f = DMat3::IDENTITY + DMat3::from_cols_array(&entries);
         let x: Vec<Point> =
             body.rest.iter().map(|&x| (f * DVec3::from_array(x)).to_array()).collect();
@@ -254,11 +257,12 @@ fn inner_nodes_are_in_balance_under_uniform_deformation() {
     let (rest, tetrahedra) = block([4, 4, 4], 0.05);
     let f = DMat3::from_cols_array(&[1.2, 0.1, 0.0, -0.2, 0.9, 0.1, 0.05, 0.0, 1.1]);
     let x: Vec<Point> = rest.iter().map(|&x| (f * DVec3::from_array(x)).to_array()).collect();
+    let with_poisson = |name, poisson| Law::new(&Material { poisson, ..material(name) }, 1);
     for poisson in [0.3, 0.499] {
         for law in [
-            Law::new(Name::Corotated, Lame::new(YOUNG, poisson).into()),
-            Law::new(Name::SaintVenantKirchhoff, Lame::new(YOUNG, poisson).into()),
-            Law::new(Name::NeoHookean, Lame::new(YOUNG, poisson).into()),
+            with_poisson(Name::Corotated, poisson),
+            with_poisson(Name::SaintVenantKirchhoff, poisson),
+            with_poisson(Name::NeoHookean, poisson),
         ] {
             let mut tissue = Tissue::new(&TissueInput {
                 rest: &rest,
@@ -285,7 +289,7 @@ fn inverted_elements_are_counted() {
     let mut tissue = Tissue::new(&TissueInput {
         rest: &rest,
         tetrahedra: &tetrahedra,
-        laws: &[Law::new(Name::NeoHookean, Lame::new(YOUNG, 0.3).into())],
+        laws: &[law_named(Name::NeoHookean)],
         regions: &[],
         fibres: &[],
         viscosity: 0.0,

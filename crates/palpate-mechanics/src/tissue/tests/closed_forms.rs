@@ -1,10 +1,11 @@
 //! Uniaxial, equibiaxial and shear response of each law against formulas in the principal stretches.
 
 use glam::{DMat3, DVec3};
+use palpate_model::Material;
 
-use super::super::law::{FibreParameters, Lame, Law, Name, Parameters};
+use super::super::law::{Lame, Law, Name};
 use super::support::{
-    DIRECTIONS, POISSON, YOUNG, laws, mooney_factors, rotations, stress, stress_along,
+    DIRECTIONS, YOUNG, law_named, laws, material, mooney_factors, rotations, stress, stress_along,
 };
 use proptest::prelude::*;
 
@@ -14,7 +15,7 @@ fn principal_stress(law: Law, s: DVec3) -> DVec3 {
     let volume = s.x * s.y * s.z;
     let (inverse, squares) = (s.recip(), s * s);
     let sum = squares.element_sum();
-    match law.name {
+    match law.material.law {
         Name::Corotated => 2.0 * mu * (s - 1.0) + lambda * (s.element_sum() - 3.0),
         Name::SaintVenantKirchhoff => {
             let strain = 0.5 * (squares - 1.0);
@@ -97,7 +98,7 @@ proptest! {
         let f = DMat3::from_cols(DVec3::X, DVec3::new(shear, 1.0, 0.0), DVec3::Z);
         for law in isotropic_laws() {
             let Lame { mu, lambda } = law.lame();
-            let exact = match law.name {
+            let exact = match law.material.law {
                 Name::MooneyRivlin => mu * shear,
                 Name::SaintVenantKirchhoff => {
                     mu * shear + shear.powi(3) * (0.5 * lambda + mu)
@@ -120,10 +121,9 @@ proptest! {
 
     #[test]
     fn fibres_stiffen_along_and_not_across(stretch in 1.0..1.4_f64, kappa in 0.0..0.33_f64) {
-        let lame = Lame::new(YOUNG, POISSON);
-        let fibres = FibreParameters { k1: 700.0, k2: 3.0, kappa, families: 1 };
-        let parameters = Parameters { fibres, ..lame.into() };
-        let law = Law::new(Name::HolzapfelGasserOgden, parameters);
+        let fibres =
+            Material { k1: 700.0, k2: 3.0, kappa, ..material(Name::HolzapfelGasserOgden) };
+        let law = Law::new(&fibres, 1);
         for axis in 0..3 {
             let mut s = DVec3::ONE;
             s[axis] = stretch;
@@ -141,13 +141,12 @@ proptest! {
         }
         // Pressed together, parallel fibres do nothing.
         let short = DMat3::from_diagonal(DVec3::new(1.0 / stretch, 1.0, 1.0));
-        let fibres = FibreParameters { kappa: 0.0, ..fibres };
-        let parallel = Law::new(Name::HolzapfelGasserOgden, Parameters { fibres, ..parameters });
+        let parallel = Law::new(&Material { kappa: 0.0, ..fibres }, 1);
         let mut directions = DIRECTIONS;
         directions[0] = [1.0, 0.0, 0.0];
         prop_assert_eq!(
             stress_along(parallel, short, &directions),
-            stress(Law::new(Name::NeoHookean, lame.into()), short)
+            stress(law_named(Name::NeoHookean), short)
         );
     }
 }

@@ -1,14 +1,16 @@
 //! Each law by itself: derivatives, rest, objectivity, small strain, inverted elements.
 
 use glam::{DMat3, DVec3};
+use palpate_model::Material;
 use proptest::prelude::*;
 
 use super::super::dual;
 use super::super::law::fibres::LARGEST_EXPONENT;
-use super::super::law::{self, ElementLaw, FibreParameters, Lame, Law, Name, with_law};
+use super::super::law::{self, ElementLaw, Lame, Law, Name, with_law};
 use super::super::real::Real;
 use super::support::{
-    DIRECTIONS, POISSON, YOUNG, dot, energy, laws, matrices, matrix, norm, rotations, rows, stress,
+    DIRECTIONS, POISSON, YOUNG, dot, energy, law_named, laws, matrices, matrix, norm, rotations,
+    rows, stress,
 };
 
 /// Change of the stress along `slope`, by dual numbers.
@@ -30,8 +32,8 @@ fn energy_slope(law: Law, f: DMat3, slope: DMat3) -> f64 {
 fn near_jump(f: DMat3) -> bool {
     let square = dot(f, f) - 3.0;
     laws().into_iter().any(|law| {
-        let FibreParameters { k2, kappa, families, .. } = law.parameters.fibres;
-        DIRECTIONS[..families].iter().any(|&d| {
+        let Material { k2, kappa, .. } = law.material;
+        DIRECTIONS[..law.families()].iter().any(|&d| {
             let fourth = (f * DVec3::from_array(d)).length_squared() - 1.0;
             let strain = kappa * square + (1.0 - 3.0 * kappa) * fourth;
             let straight = (LARGEST_EXPONENT / k2).sqrt();
@@ -118,7 +120,7 @@ proptest! {
         for law in laws() {
             // Without fibres, which are slack or not at rest.
             let mut law = law;
-            law.parameters.fibres.k1 = 0.0;
+            law.material.k1 = 0.0;
             let slope = stress_slope(law, DMat3::IDENTITY, change);
             prop_assert!(norm(slope - linear) < 1e-10 * YOUNG, "{law:?}: {slope} {linear}");
         }
@@ -144,8 +146,7 @@ proptest! {
     fn inverted_elements_are_pushed_back(depth in -0.9..0.0_f64, r in rotations(), q in rotations()) {
         let f = r * DMat3::from_diagonal(DVec3::new(1.0, 1.0, depth)) * q.transpose();
         let deeper = r * DMat3::from_diagonal(DVec3::new(0.0, 0.0, 1.0)) * q.transpose();
-        let lame = Lame::new(YOUNG, POISSON);
-        for law in [Law::new(Name::NeoHookean, lame.into()), Law::new(Name::Corotated, lame.into())] {
+        for law in [law_named(Name::NeoHookean), law_named(Name::Corotated)] {
             let push = -dot(stress(law, f), deeper);
             prop_assert!(push > 0.05 * YOUNG, "{law:?} at {depth}: {push}");
         }

@@ -2,12 +2,11 @@
 
 use glam::{DMat3, DQuat, DVec3};
 use palpate_geometry::Point;
+use palpate_model::Material;
 use palpate_testing::{Fastest, box_of_cells};
 use proptest::prelude::*;
 
-use super::super::law::{
-    self, Directions, ElementLaw, FibreParameters, Lame, Law, Name, Parameters, with_law,
-};
+use super::super::law::{self, Directions, ElementLaw, Law, Name, with_law};
 use super::super::matrix::Matrix;
 use super::super::{Tissue, TissueInput, VolumeAveraging};
 
@@ -16,25 +15,26 @@ pub(super) const POISSON: f64 = 0.4;
 
 /// Every law, with the same elasticity at small strain (the matrix alone where there are fibres).
 pub(super) fn laws() -> Vec<Law> {
-    let lame = Lame::new(YOUNG, POISSON);
-    let hgo = |kappa, families| {
-        let fibres = FibreParameters { k1: 900.0, k2: 2.0, kappa, families };
-        Law::new(Name::HolzapfelGasserOgden, Parameters { fibres, ..lame.into() })
-    };
-    vec![
-        Law::new(Name::Corotated, lame.into()),
-        Law::new(Name::SaintVenantKirchhoff, lame.into()),
-        Law::new(Name::NeoHookean, lame.into()),
-        Law::new(Name::MooneyRivlin, Parameters { mooney: 0.3, ..lame.into() }),
-        hgo(0.0, 1),
-        hgo(0.2, 2),
-    ]
+    let with = |name| Material { k1: 900.0, k2: 2.0, mooney: 0.3, ..material(name) };
+    let names = Name::ALL.into_iter().filter(|&name| name != Name::Linear);
+    let dispersed = Material { kappa: 0.2, ..with(Name::HolzapfelGasserOgden) };
+    let once = names.map(|name| Law::new(&with(name), 1));
+    once.chain([Law::new(&dispersed, 2)]).collect()
+}
+
+/// A law with the elasticity of [`laws`].
+pub(super) fn law_named(name: Name) -> Law {
+    Law::new(&material(name), 1)
+}
+
+pub(super) fn material(law: Name) -> Material {
+    Material { law, young: YOUNG, poisson: POISSON, ..Material::default() }
 }
 
 /// Factors `c10`, `c01` [Pa] of the two invariants in Mooney-Rivlin.
 pub(super) fn mooney_factors(law: Law) -> [f64; 2] {
-    let half = 0.5 * law.parameters.lame.mu;
-    [half * (1.0 - law.parameters.mooney), half * law.parameters.mooney]
+    let half = 0.5 * law.lame().mu;
+    [half * (1.0 - law.material.mooney), half * law.material.mooney]
 }
 
 /// Two unit directions that are neither parallel nor along an axis.
@@ -95,7 +95,7 @@ pub(super) struct TestBody {
 
 impl TestBody {
     /// `shift` moves the rest nodes, as fractions of a cell, again from the start when it ends.
-    pub(super) fn new(laws: [Law; 2], viscosity: f64, shift: &[f64]) -> Self {
+    pub(super) fn new(laws: &[Law; 2], viscosity: f64, shift: &[f64]) -> Self {
         let (mut rest, tetrahedra) = block([2, 2, 1], 0.1);
         for (value, shift) in rest.as_flattened_mut().iter_mut().zip(shift.iter().cycle()) {
             *value += 0.1 * shift;
@@ -107,7 +107,7 @@ impl TestBody {
                 DIRECTIONS.map(|d| (turn * DVec3::from_array(d)).to_array())
             })
             .collect();
-        Self { rest, tetrahedra, regions, fibres, laws, viscosity }
+        Self { rest, tetrahedra, regions, fibres, laws: *laws, viscosity }
     }
 
     pub(super) fn tissue(&self, averaging: VolumeAveraging) -> Tissue {
