@@ -1041,6 +1041,30 @@ TABLE: list[tuple[str, Callable[[World], Any], type[Exception], str]] = [
         "body 0 cannot be cut: the option min_edge is -1; it must be a length, or 0 for none",
     ),
     (
+        "cut-live-no-blade",
+        lambda world: world.simulation.cut_live(None),
+        TypeError,
+        "blade: expected a palpate.Blade, got NoneType",
+    ),
+    (
+        "cut-live-snap",
+        lambda world: world.simulation.cut_live(UNIT, snap=-0.1),
+        palpate.SimulationError,
+        "body 0 cannot be cut: the option snap is -0.1; it must be in [0, 0.5]",
+    ),
+    (
+        "cut-live-at-once",
+        lambda world: world.simulation.cut_live(UNIT, delay=0),
+        ValueError,
+        "delay: expected an integer of at least 1, got 0",
+    ),
+    (
+        "cut-live-never",
+        lambda world: world.simulation.cut_live(UNIT, delay=10**12),
+        ValueError,
+        "delay: expected at most 1000 steps, got 1000000000000",
+    ),
+    (
         "remove-index",
         lambda world: world.simulation.remove(0, [99]),
         IndexError,

@@ -377,9 +377,14 @@ def test_cutting_measures_a_long_cut(tmp_path):
     assert results["frames"] == 6
     assert results["opened"] > 0
     assert results["tetrahedra"][1] > results["tetrahedra"][0]
-    for spread in [results["usual"], *results["while_cutting"].values()]:
+    assert 0 < results["opened_live"] <= results["opened"]
+    live = results["while_cutting_live"]
+    assert set(live) == {"opening", "step", "frame"}
+    for spread in [results["usual"], *results["while_cutting"].values(), *live.values()]:
         assert 0 <= spread["median"] <= spread["p99"] <= spread["worst"]
     assert set(results["kept_and_new"]) == {"wide", "paper"}
     assert all(min(both) > 0 for both in results["kept_and_new"].values())
     assert len(rows(tmp_path / "cutting.csv")) == 6
-    assert "| frame |" in (tmp_path / "report.md").read_text()
+    report = (tmp_path / "report.md").read_text()
+    assert "| at once: frame |" in report
+    assert "| live: frame |" in report

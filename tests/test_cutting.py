@@ -69,6 +69,44 @@ def test_a_blade_that_misses_changes_nothing(simulation):
     assert simulation.model is model
 
 
+def test_a_live_cut_opens_when_it_should_and_maps_the_users_arrays(simulation, tmp_path):
+    simulation.step(10)
+    old = simulation.positions[0]
+    mesh = simulation.model.bodies[0].mesh
+    assert simulation.cut_live(stroke(), delay=3) is None
+    snapshot = simulation.snapshot()
+    for _ in range(3):
+        report = simulation.step()
+        assert report.cuts == ()
+        assert simulation.positions[0].shape == old.shape
+    simulation.save(tmp_path / "cut.palpate")
+    report = simulation.step()
+    (cut,) = report.cuts
+    (body,) = cut.bodies
+    assert set(cut.times) == {"cutting", "detection", "mechanics", "total"}
+    assert 0 < report.stages["change"] <= report.times["total"]
+    assert len(simulation.positions[0]) == len(old) + body.new_nodes
+    np.testing.assert_allclose(
+        body.change.at_nodes(mesh.nodes), simulation.model.bodies[0].mesh.nodes, atol=1e-15
+    )
+    expected = simulation.step(10)
+    positions = simulation.positions[0]
+    loaded = palpate.Simulation.load(tmp_path / "cut.palpate", threads=2)
+    assert len(loaded.step(11).cuts) == 1
+    simulation.restore(snapshot)
+    assert simulation.model.bodies[0].mesh == mesh
+    again = simulation.step(14)
+    assert len(again.cuts) == 1
+    for each in (loaded, simulation):
+        np.testing.assert_array_equal(each.positions[0], positions)
+    assert again.contacts == expected.contacts
+
+
+def test_a_live_cut_may_miss_everything(simulation):
+    simulation.cut_live(stroke(x=5.0), delay=1)
+    assert [len(cut) for cut in simulation.step(3).cuts] == [0]
+
+
 def test_cut_separate_and_go_back(simulation, tmp_path):
     simulation.step(5)
     start = simulation.snapshot()

@@ -258,6 +258,13 @@ scene = palpate.Scene("small", threads=threads)
 simulation = palpate.Simulation("small", threads=threads)
 simulation.step(3)
 scene.intersections()
+edges = [[[0.001, y, -0.1], [0.003, y, 0.3]] for y in (-0.1, 0.005)]
+blade = palpate.Blade.stroke(edges)
+if sys.argv[2] == "old":
+    simulation.cut_live(blade, delay=2)
+    simulation.step()
+else:
+    simulation.step()
 child = os.fork()
 if child == 0:
     if sys.argv[2] == "old":
@@ -265,7 +272,7 @@ if child == 0:
         scene.intersections()
     else:
         other = palpate.Simulation("small", threads=threads)
-        other.step(6)
+        other.step(7)
         simulation = other
     sys.stdout.write(simulation.positions[0].tobytes().hex() + "\\n")
     sys.stdout.flush()

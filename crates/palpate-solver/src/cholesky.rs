@@ -292,6 +292,9 @@ impl Cholesky {
             return Ok(());
         }
         let keeps = change.is_some() || self.kept.is_some();
+        if self.memory.try_lock().is_none() {
+            self.memory = SharedMemory::default();
+        }
         self.give_memory();
         let memory = self.memory.clone();
         let mut memory = memory.lock();
@@ -344,7 +347,9 @@ impl Cholesky {
 
     /// Leaves the numbers to the next factorisation as memory.
     fn give_memory(&mut self) {
-        let memory = &mut *self.memory.lock();
+        let shared = self.memory.clone();
+        let Some(mut memory) = shared.try_lock() else { return };
+        let memory = &mut *memory;
         match &mut self.packed {
             Packed::Single(packed) => packed.clear(&mut memory.single),
             Packed::Double(packed) => packed.clear(&mut memory.double),

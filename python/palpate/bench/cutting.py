@@ -31,7 +31,7 @@ SETTLE = 240
 USUAL = 60
 
 #: Steps until a live cut opens.
-DELAY = 4
+DELAY = 5
 
 #: How long the frames and their stages took, by row of the report: cut at once, and live.
 STAGES = ("cutting", "detection", "mechanics", "step", "frame")

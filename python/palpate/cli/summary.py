@@ -12,6 +12,7 @@ from palpate.pictures.files import length_text
 
 #: What the stages do.
 _STAGES = {
+    "change": "live cuts that open",
     "update": "positions into the bounding boxes",
     "penetration": "search for nodes inside other bodies",
     "proximity": "search for close pairs",

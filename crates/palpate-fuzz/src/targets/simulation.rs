@@ -131,8 +131,10 @@ fn call(
             let mut done = Ok(());
             for _ in 0..=choices.below(6) {
                 let start = everything(simulation)?;
+                // A live cut that has opened stays open when the step fails.
+                let opens = simulation.has_live_cuts();
                 done = simulation.step().map(drop);
-                if done.is_err() {
+                if done.is_err() && !opens {
                     unchanged(simulation, &start, "step")?;
                     break;
                 }
@@ -214,7 +216,7 @@ fn call(
     Ok(outcome(done.0, done.1))
 }
 
-/// Along a plane; `None` where there is none, or the model is large.
+/// Along a plane, at once or live; `None` where there is none, or the model is large.
 fn cut(
     simulation: &mut Simulation,
     choices: &mut Choices,
@@ -227,6 +229,12 @@ fn cut(
     let size = choices.flag().then(|| choices.number());
     let Ok(blade) = Blade::plane(point, choices.point(), size) else { return Ok(None) };
     let before = everything(simulation)?;
+    if choices.flag() {
+        let delay = choices.below(5) as u32;
+        let done = simulation.cut_live(&blade, &CutOptions::default(), delay);
+        unchanged(simulation, &before, "a cut that is prepared")?;
+        return Ok(Some(done));
+    }
     let done = simulation.cut(&blade, &CutOptions::default());
     if done.as_ref().is_ok_and(|report| report.bodies.is_empty()) {
         unchanged(simulation, &before, "a cut that missed")?;

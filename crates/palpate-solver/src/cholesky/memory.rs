@@ -1,6 +1,6 @@
 //! Memory that factors leave to the next one: asking the system for it takes as long as the numbers.
 
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
 
 use super::multifrontal::Fronts;
 use super::packed::Panel;
@@ -25,6 +25,15 @@ impl SharedMemory {
     pub(super) fn lock(&self) -> MutexGuard<'_, Memory> {
         // What it holds is overwritten before it is read.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Nothing while another thread works in it, as one of the parent of a process does for ever.
+    pub(super) fn try_lock(&self) -> Option<MutexGuard<'_, Memory>> {
+        match self.0.try_lock() {
+            Ok(memory) => Some(memory),
+            Err(TryLockError::Poisoned(error)) => Some(error.into_inner()),
+            Err(TryLockError::WouldBlock) => None,
+        }
     }
 
     /// Whether another factor can use it.

@@ -35,8 +35,9 @@ const SLOW: u32 = 6;
 /// The same when a node has moved by more than this part of the body's radius since, apart from the
 /// body's motion as a whole: slow processes need few iterations in each of very many steps.
 const DEFORMED: f64 = 0.1;
-/// Part of that from which on an A that is made for another reason takes the present shape.
-const SOON: f64 = 0.5;
+/// Part of that from which on an A that is made for another reason takes the present shape; what is made of a
+/// shape near it can be taken over otherwise.
+const SOON: f64 = 0.05;
 /// A move went too far when the residual along it has turned round and is more than this part of what it was;
 /// it is shortened so many times at most, and not below this part of it at a time.
 const OVERSHOT: f64 = 0.5;

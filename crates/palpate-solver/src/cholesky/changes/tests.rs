@@ -393,3 +393,17 @@ fn a_factor_goes_on_after_a_change_that_fails_and_after_another_matrix() {
     history.change(&[Change::Split(21, 3)]);
     assert_eq!(history.factor.stats().computed, history.factor.stats().supernodes);
 }
+
+#[test]
+fn memory_in_which_another_thread_works_is_left_to_it() {
+    let mut history = History::new(grid(4), Precision::Single);
+    history.change(&[Change::Split(3, 1)]);
+    let memory = history.factor.memory.clone();
+    // As in a process that was forked while a thread of its parent was at work: it never lets go.
+    let _held = memory.lock();
+    history.change(&[Change::Split(20, 3)]);
+    let matrix = history.mesh.matrix();
+    let order = history.mesh.order(&matrix);
+    assert_same(&history.factor, &Cholesky::in_order(&matrix, Precision::Single, order).unwrap());
+    history.factor.refactor(&matrix).unwrap();
+}
