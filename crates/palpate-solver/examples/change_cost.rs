@@ -78,11 +78,14 @@ fn main() -> Result<(), Box<dyn Error>> {
         let origins: Vec<Option<u32>> = (0..nodes.len() as u32).map(Some).collect();
         let first = times(
             9,
-            [&mut || drop(factor.changed(&matrix, order.clone(), &origins)), &mut || {
-                drop(Cholesky::in_order(&matrix, Precision::Single, order.clone()));
-            }],
+            [
+                &mut || drop(factor.changed(&matrix, Precision::Single, order.clone(), &origins)),
+                &mut || {
+                    drop(Cholesky::in_order(&matrix, Precision::Single, order.clone()));
+                },
+            ],
         );
-        let factor = factor.changed(&matrix, order.clone(), &origins)?;
+        let factor = factor.changed(&matrix, Precision::Single, order.clone(), &origins)?;
         println!(
             "{path}: first change {:.2} ms, from nothing {:.2} ms; {:.1} MB kept, factor {:.1} MB",
             first[0],
@@ -122,8 +125,12 @@ fn main() -> Result<(), Box<dyn Error>> {
                 25,
                 [
                     &mut || {
-                        let changed =
-                            factor.changed(&changed_matrix, changed_order.clone(), &origins);
+                        let changed = factor.changed(
+                            &changed_matrix,
+                            Precision::Single,
+                            changed_order.clone(),
+                            &origins,
+                        );
                         stats = changed.expect("still positive definite").stats();
                     },
                     &mut || {

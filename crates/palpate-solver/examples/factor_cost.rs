@@ -26,7 +26,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let mesh = read_mesh(Path::new(&path), &ReadOptions::default())?.mesh;
         let matrix = system(mesh.nodes(), mesh.tetrahedra());
         let count = mesh.nodes().len();
-        for precision in [Precision::Double, Precision::Single] {
+        for precision in [Precision::Double, Precision::Single, Precision::BlockFloat] {
             let start = Instant::now();
             let mut factor = Cholesky::with_precision(&matrix, precision)?;
             let build = start.elapsed().as_secs_f64() * 1e3;

@@ -1,6 +1,7 @@
 //! The factor of a body's matrix: made once, solved every step.
 
 mod assembly;
+mod block_float;
 mod changes;
 mod elimination;
 mod finish;
@@ -11,17 +12,20 @@ mod multifrontal;
 mod packed;
 mod probe;
 mod real;
+mod stored;
 mod supernodes;
 mod tiles;
 
 use crate::ordering::{NONE, NodeOrder, OrderingMethod};
 use crate::{BlockMatrix, BlockPattern};
-use changes::{Kept, Older, Plan};
+use block_float::BlockFloat;
+use changes::{Contribution, Kept, Older, Plan};
 pub use half::{HalfSolution, half_products};
 use half::{HalfWorkspace, NODES, Paths};
-use memory::{Memory, SharedMemory};
-use packed::{PackedFactor, PackedWorkspace};
+use memory::{Memory, SharedMemory, Spare};
+use packed::{PackedFactor, PackedWorkspace, Panel};
 use probe::Probe;
+use stored::Stored;
 use supernodes::Supernodes;
 
 /// Columns of its nodes must have 32-bit numbers.
@@ -35,6 +39,11 @@ pub enum Precision {
     /// Half the bytes, and half the time of a solve, where the matrix is well enough conditioned
     /// for solutions to five digits; double precision where not.
     Single,
+    /// Sixteen bits per entry with a scale for 32 of them: half the bytes and the time of `Single`. For
+    /// solutions to four digits where all is smooth, and to two or three of what is stiffest in them
+    /// (in the norm of the matrix); single precision where that would be worse. Products with the
+    /// inverse stay symmetric and positive.
+    BlockFloat,
 }
 
 /// Why a matrix has no usable factor.
@@ -116,16 +125,21 @@ struct Change<'a> {
 
 /// The factor in the precision that it is solved in.
 enum Packed {
-    Single(PackedFactor<f32>),
-    Double(PackedFactor<f64>),
+    BlockFloat(PackedFactor<BlockFloat>),
+    Single(PackedFactor<Panel<f32>>),
+    Double(PackedFactor<Panel<f64>>),
 }
 
 impl Packed {
-    fn single(&self) -> Option<&PackedFactor<f32>> {
+    fn block_float(&self) -> Option<&PackedFactor<BlockFloat>> {
+        if let Self::BlockFloat(packed) = self { Some(packed) } else { None }
+    }
+
+    fn single(&self) -> Option<&PackedFactor<Panel<f32>>> {
         if let Self::Single(packed) = self { Some(packed) } else { None }
     }
 
-    fn double(&self) -> Option<&PackedFactor<f64>> {
+    fn double(&self) -> Option<&PackedFactor<Panel<f64>>> {
         if let Self::Double(packed) = self { Some(packed) } else { None }
     }
 }
@@ -149,6 +163,9 @@ pub struct SolveWorkspace {
 macro_rules! solve {
     ($self:ident, $work:ident, $method:ident, $($argument:expr),*) => {
         match &$self.packed {
+            Packed::BlockFloat(packed) => {
+                packed.$method(&$self.order.nodes, $($argument,)* &mut $work.single);
+            }
             Packed::Single(packed) => {
                 packed.$method(&$self.order.nodes, $($argument,)* &mut $work.single);
             }
@@ -203,7 +220,7 @@ impl Cholesky {
     }
 
     /// The factor of a matrix that differs from the one of this factor in some places: what they have in
-    /// common is taken over. It is kept in the same precision, and has the same bits as
+    /// common is taken over, if it is kept in the same precision. It has the same bits as
     /// [`Cholesky::in_order`] gives it.
     ///
     /// `origins[node]` is the node of this factor's matrix that a node was, `None` if it is new. What
@@ -220,11 +237,12 @@ impl Cholesky {
     pub fn changed(
         &self,
         matrix: &BlockMatrix,
+        precision: Precision,
         order: NodeOrder,
         origins: &[Option<u32>],
     ) -> Result<Self, FactorError> {
         assert_eq!(origins.len(), matrix.pattern().node_count(), "one origin per node");
-        let mut result = Self::analysed(matrix, self.precision, order, self.memory.clone())?;
+        let mut result = Self::analysed(matrix, precision, order, self.memory.clone())?;
         let twins = match &self.kept {
             None => vec![NONE; result.supernodes.count()],
             Some(kept) => {
@@ -297,30 +315,32 @@ impl Cholesky {
         }
         self.give_memory();
         let memory = self.memory.clone();
-        let mut memory = memory.lock();
-        let Memory { fronts, probe, contributions: spare, single, double } = &mut *memory;
+        let memory = &mut *memory.lock();
         let mut contributions = Vec::new();
-        let is_single = self.precision == Precision::Single && {
-            let known = change.and_then(|change| Some((change, change.older.packed.single()?)));
-            let mut plan = self.plan(known, keeps);
-            self.computed = plan.computed_count();
-            let packed = fronts
-                .factor(&self.supernodes, matrix, &mut plan, single, spare)
-                .map_err(|place| self.not_positive(place))?;
-            self.packed = Packed::Single(packed);
-            contributions = plan.into_kept();
-            Probe::new(self, matrix, probe).is_accurate_in_single()
-        };
-        if !is_single {
-            let known = change.and_then(|change| Some((change, change.older.packed.double()?)));
-            let mut plan = self.plan(known, keeps);
-            self.computed = plan.computed_count();
-            let packed = fronts
-                .factor(&self.supernodes, matrix, &mut plan, double, spare)
-                .map_err(|place| self.not_positive(place))?;
-            self.packed = Packed::Double(packed);
-            contributions = plan.into_kept();
-            let probe = Probe::new(self, matrix, probe);
+        let mut is_accurate = false;
+        if self.precision == Precision::BlockFloat {
+            let (packed, kept) =
+                self.factored(matrix, change, keeps, memory, Packed::block_float, |memory| {
+                    &mut memory.block_float
+                })?;
+            (self.packed, contributions) = (Packed::BlockFloat(packed), kept);
+            is_accurate = Probe::new(self, matrix, &mut memory.probe).is_accurate_in_block_float();
+        }
+        if !is_accurate && self.precision != Precision::Double {
+            let (packed, kept) =
+                self.factored(matrix, change, keeps, memory, Packed::single, |memory| {
+                    &mut memory.single
+                })?;
+            (self.packed, contributions) = (Packed::Single(packed), kept);
+            is_accurate = Probe::new(self, matrix, &mut memory.probe).is_accurate_in_single();
+        }
+        if !is_accurate {
+            let (packed, kept) =
+                self.factored(matrix, change, keeps, memory, Packed::double, |memory| {
+                    &mut memory.double
+                })?;
+            (self.packed, contributions) = (Packed::Double(packed), kept);
+            let probe = Probe::new(self, matrix, &mut memory.probe);
             if !probe.is_accurate() {
                 return Err(FactorError::Inaccurate { residual: probe.residual });
             }
@@ -330,12 +350,33 @@ impl Cholesky {
         Ok(())
     }
 
-    /// What to compute where the columns of the changed factor are `known`.
-    fn plan<'a, T>(
-        &self,
-        known: Option<(&Change<'a>, &'a PackedFactor<T>)>,
+    /// Computes what the older factor has not, if it `has` this kind; and what is kept for the next change.
+    fn factored<P: Stored>(
+        &mut self,
+        matrix: &BlockMatrix,
+        change: Option<&Change>,
         keeps: bool,
-    ) -> Plan<'a, T> {
+        memory: &mut Memory,
+        has: impl FnOnce(&Packed) -> Option<&PackedFactor<P>>,
+        spare: impl FnOnce(&mut Memory) -> &mut Spare<P>,
+    ) -> Result<(PackedFactor<P>, Vec<Option<Contribution>>), FactorError> {
+        let known = change.and_then(|change| Some((change, has(&change.older.packed)?)));
+        let mut plan = self.plan(known, keeps);
+        self.computed = plan.computed_count();
+        let mut panels = std::mem::take(spare(memory));
+        let Memory { fronts, contributions, .. } = memory;
+        let packed = fronts
+            .factor(&self.supernodes, matrix, &mut plan, &mut panels, contributions)
+            .map_err(|place| self.not_positive(place))?;
+        Ok((packed, plan.into_kept()))
+    }
+
+    /// What to compute where the columns of the changed factor are `known`.
+    fn plan<'a, P>(
+        &self,
+        known: Option<(&Change<'a>, &'a PackedFactor<P>)>,
+        keeps: bool,
+    ) -> Plan<'a, P> {
         if let Some((change, packed)) = known
             && let Some(kept) = &change.older.kept
         {
@@ -351,6 +392,7 @@ impl Cholesky {
         let Some(mut memory) = shared.try_lock() else { return };
         let memory = &mut *memory;
         match &mut self.packed {
+            Packed::BlockFloat(packed) => packed.clear(&mut memory.block_float),
             Packed::Single(packed) => packed.clear(&mut memory.single),
             Packed::Double(packed) => packed.clear(&mut memory.double),
         }
@@ -381,6 +423,7 @@ impl Cholesky {
     pub fn workspace(&self) -> SolveWorkspace {
         let mut workspace = SolveWorkspace::default();
         match &self.packed {
+            Packed::BlockFloat(packed) => packed.fit(&mut workspace.single),
             Packed::Single(packed) => packed.fit(&mut workspace.single),
             Packed::Double(packed) => packed.fit(&mut workspace.double),
         }
@@ -436,6 +479,9 @@ impl Cholesky {
             }
             let places = &places[..nodes.len()];
             match &self.packed {
+                Packed::BlockFloat(packed) => {
+                    packed.half_solve(&self.paths, places, halves, &mut workspace.half_single);
+                }
                 Packed::Single(packed) => {
                     packed.half_solve(&self.paths, places, halves, &mut workspace.half_single);
                 }
@@ -486,6 +532,7 @@ impl Cholesky {
             entries: self.order.factor_entries,
             flops: self.order.flops,
             bytes: match &self.packed {
+                Packed::BlockFloat(packed) => packed.bytes(),
                 Packed::Single(packed) => packed.bytes(),
                 Packed::Double(packed) => packed.bytes(),
             },

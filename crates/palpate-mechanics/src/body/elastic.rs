@@ -35,6 +35,8 @@ pub(crate) use system::check_fixed_nodes;
 use system::{SystemMatrix, check_material, in_body_numbering, linear_stiffness, lumped_masses};
 
 const FIXED: u32 = u32::MAX;
+/// Entries of a factor beyond which caches do not hold it: a solve takes as long as reading its bytes does.
+const LARGE_FACTOR: u64 = 2_000_000;
 
 pub(crate) struct ElasticBody {
     /// Rest positions relative to their centre of mass [m].
@@ -135,9 +137,16 @@ impl ElasticBody {
                 [] => NodeOrder::new(system.pattern()),
                 order => NodeOrder::given(system.pattern(), order),
             };
+            let is_large = order.factor_entries > LARGE_FACTOR;
+            // Iterations put right what fewer bits lose.
+            let precision = if is_large && material.law != Law::Linear {
+                Precision::BlockFloat
+            } else {
+                Precision::Single
+            };
             let factor = match known.before {
-                Some((before, origins)) => before.factor.changed(system, order, origins),
-                None => Cholesky::in_order(system, Precision::Single, order),
+                Some((before, origins)) => before.factor.changed(system, precision, order, origins),
+                None => Cholesky::in_order(system, precision, order),
             };
             factor.map_err(|source| {
                 let source = in_body_numbering(source, &free_nodes);

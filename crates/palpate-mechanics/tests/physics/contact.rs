@@ -74,34 +74,50 @@ fn a_deformed_body_at_rest_has_no_velocity() {
 
 /// What the contact forces were solved for is what happens, whatever the law: a body pressed off its centre
 /// turns, and where its response left that out surfaces passed each other although every gap was kept.
+/// Throws a leaning block of so many cells on the floor; returns it, and the contacts that there were.
+fn assert_gaps(law: Law, cells: [usize; 3], steps: usize) -> (World, usize) {
+    let lean = |[x, y, z]: [f64; 3]| [x + 0.5 * z, y + 0.2 * x, z + 0.002 + 0.3 * x];
+    let mesh = box_mesh(cells, [0.06, 0.05, 0.09], lean);
+    let mut bodies = vec![rigid("floor", &floor(0.3, 0.0, |x| x)), soft("block", &mesh, 2e4, 0.01)];
+    bodies[1].material.law = law;
+    bodies[1].initial_velocity = [0.3, 0.0, -1.0];
+    let mut world = World::new(&model(bodies, GRAVITY), DT, 1);
+    let mut seen = 0;
+    for step in 0..steps {
+        world.step();
+        for contact in world.dynamics.contacts() {
+            let mut gap = 0.0;
+            for corner in 0..4 {
+                let body = contact.body_of(corner);
+                let x = world.dynamics.positions(body)[contact.nodes[corner] as usize];
+                let height: f64 = x.iter().zip(contact.normal).map(|(x, n)| x * n).sum();
+                gap += contact.weights[corner] * height;
+            }
+            let error = (gap - contact.gap).abs();
+            assert!(error < 1e-6, "{law}, step {step}: {gap} instead of {}", contact.gap);
+            seen += 1;
+        }
+    }
+    (world, seen)
+}
+
 #[test]
 fn contacts_end_with_the_gaps_that_their_forces_were_solved_for() {
     for law in [Law::Linear, Law::Corotated, Law::NeoHookean] {
-        let lean = |[x, y, z]: [f64; 3]| [x + 0.5 * z, y + 0.2 * x, z + 0.002 + 0.3 * x];
-        let mesh = box_mesh([4, 3, 5], [0.06, 0.05, 0.09], lean);
-        let mut bodies =
-            vec![rigid("floor", &floor(0.3, 0.0, |x| x)), soft("block", &mesh, 2e4, 0.01)];
-        bodies[1].material.law = law;
-        bodies[1].initial_velocity = [0.3, 0.0, -1.0];
-        let mut world = World::new(&model(bodies, GRAVITY), DT, 1);
-        let mut seen = 0;
-        for step in 0..90 {
-            world.step();
-            for contact in world.dynamics.contacts() {
-                let mut gap = 0.0;
-                for corner in 0..4 {
-                    let body = contact.body_of(corner);
-                    let x = world.dynamics.positions(body)[contact.nodes[corner] as usize];
-                    let height: f64 = x.iter().zip(contact.normal).map(|(x, n)| x * n).sum();
-                    gap += contact.weights[corner] * height;
-                }
-                let error = (gap - contact.gap).abs();
-                assert!(error < 1e-6, "{law}, step {step}: {gap} instead of {}", contact.gap);
-                seen += 1;
-            }
-        }
+        let (_, seen) = assert_gaps(law, [4, 3, 5], 90);
         assert!(seen > 200, "{seen}");
     }
+}
+
+#[test]
+fn a_large_factor_of_few_bits_leaves_the_same_gaps() {
+    let (world, seen) = assert_gaps(Law::NeoHookean, [12, 12, 18], 8);
+    assert!(seen > 200, "{seen}");
+    let factor = world.dynamics.factor_stats(1).unwrap();
+    assert!(factor.bytes as u64 <= 3 * factor.entries, "sixteen bits: {factor:?}");
+    let (world, _) = assert_gaps(Law::NeoHookean, [4, 3, 5], 1);
+    let factor = world.dynamics.factor_stats(1).unwrap();
+    assert!(factor.bytes as u64 >= 4 * factor.entries, "thirty-two bits: {factor:?}");
 }
 
 fn assert_supported(world: &mut World) {

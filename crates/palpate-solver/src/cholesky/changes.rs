@@ -122,16 +122,16 @@ fn has_same_bits(a: &Block, b: &Block) -> bool {
 }
 
 /// What a factorisation takes over and what it keeps, by supernode.
-pub(super) struct Plan<'a, T> {
+pub(super) struct Plan<'a, P> {
     /// Its pieces, if they are known.
-    pub(super) known: Vec<Option<&'a [Supernode<T>]>>,
+    pub(super) known: Vec<Option<&'a [Supernode<P>]>>,
     pub(super) is_computed: Vec<bool>,
     pub(super) is_kept: Vec<bool>,
     /// Known to begin with, and those that are kept.
     pub(super) contributions: Vec<Option<Contribution>>,
 }
 
-impl<'a, T> Plan<'a, T> {
+impl<'a, P> Plan<'a, P> {
     /// Everything is computed and nothing is kept.
     pub(super) fn whole(supernodes: &Supernodes) -> Self {
         let count = supernodes.count();
@@ -153,7 +153,7 @@ impl<'a, T> Plan<'a, T> {
         supernodes: &Supernodes,
         twins: &[u32],
         older: &Older,
-        factor: &'a PackedFactor<T>,
+        factor: &'a PackedFactor<P>,
     ) -> Self {
         let mut plan = Self::keeping(supernodes);
         for (s, &twin) in twins.iter().enumerate().filter(|&(_, &twin)| twin != NONE) {

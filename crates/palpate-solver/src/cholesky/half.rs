@@ -12,6 +12,7 @@ use pulp::Simd;
 
 use super::packed::{PackedFactor, Panel, ROWS};
 use super::real::Real;
+use super::stored::Stored;
 use super::supernodes::Supernodes;
 
 /// Right-hand sides that go through the tree together: a whole number of vectors of any machine, and a
@@ -164,12 +165,14 @@ pub(super) struct HalfWorkspace<T> {
     /// Right-hand sides of each column.
     x: Vec<[T; SIDES]>,
     rows: Vec<[T; SIDES]>,
+    /// A panel as numbers.
+    panel: Vec<Panel<T>>,
     /// Supernodes on the paths of the nodes, ascending.
     path: Vec<u32>,
     is_on_path: Vec<bool>,
 }
 
-impl<T: Real> PackedFactor<T> {
+impl<P: Stored> PackedFactor<P> {
     /// Half solutions of the nodes at `places`, at most [`NODES`]: neighbours in the order of elimination
     /// share most of their paths.
     pub(super) fn half_solve(
@@ -177,11 +180,13 @@ impl<T: Real> PackedFactor<T> {
         paths: &Paths,
         places: &[u32],
         halves: &mut [HalfSolution],
-        work: &mut HalfWorkspace<T>,
+        work: &mut HalfWorkspace<P::Real>,
     ) {
         let (columns, longest) = (self.size, self.longest);
-        work.x.resize(columns.max(work.x.len()), [T::ZERO; SIDES]);
-        work.rows.resize(longest.max(work.rows.len()), [T::ZERO; SIDES]);
+        work.x.resize(columns.max(work.x.len()), [P::Real::ZERO; SIDES]);
+        work.rows.resize(longest.max(work.rows.len()), [P::Real::ZERO; SIDES]);
+        let panel = P::memory_columns(self.widest);
+        work.panel.resize(panel.max(work.panel.len()), Panel::<P::Real>::ZERO);
         work.is_on_path.resize(self.supernodes.len().max(work.is_on_path.len()), false);
         work.path.clear();
         for &place in places {
@@ -195,11 +200,11 @@ impl<T: Real> PackedFactor<T> {
         work.path.sort_unstable();
         for &s in &work.path {
             work.is_on_path[s as usize] = false;
-            work.x[self.supernodes[s as usize].columns()].fill([T::ZERO; SIDES]);
+            work.x[self.supernodes[s as usize].columns()].fill([P::Real::ZERO; SIDES]);
         }
         for (index, &place) in places.iter().enumerate() {
             for axis in 0..3 {
-                work.x[3 * place as usize + axis][3 * index + axis] = T::from_f64(1.0);
+                work.x[3 * place as usize + axis][3 * index + axis] = P::Real::from_f64(1.0);
             }
         }
         pulp::Arch::new().dispatch(HalfPass { factor: self, work, sides: 3 * places.len() });
@@ -225,21 +230,21 @@ impl<T: Real> PackedFactor<T> {
 }
 
 /// The forward pass along some paths for many right-hand sides.
-struct HalfPass<'a, T> {
-    factor: &'a PackedFactor<T>,
-    work: &'a mut HalfWorkspace<T>,
+struct HalfPass<'a, P: Stored> {
+    factor: &'a PackedFactor<P>,
+    work: &'a mut HalfWorkspace<P::Real>,
     sides: usize,
 }
 
-impl<T: Real> pulp::WithSimd for HalfPass<'_, T> {
+impl<P: Stored> pulp::WithSimd for HalfPass<'_, P> {
     type Output = ();
 
     #[allow(clippy::inline_always)] // as above
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
         let HalfPass { factor, work, sides } = self;
-        let vectors = sides.div_ceil(T::lanes::<S>());
-        let padded = vectors * T::lanes::<S>();
+        let vectors = sides.div_ceil(P::Real::lanes::<S>());
+        let padded = vectors * P::Real::lanes::<S>();
         for &s in &work.path {
             let supernode = &factor.supernodes[s as usize];
             let row_count = supernode.row_count();
@@ -248,21 +253,29 @@ impl<T: Real> pulp::WithSimd for HalfPass<'_, T> {
             for first in (0..row_count).step_by(ROWS) {
                 let (panel, rest) = panels.split_at(top.len().min(first + ROWS));
                 panels = rest;
+                let panel = P::panel(panel, &mut work.panel);
                 let top = &top[..panel.len()];
                 for row in (0..ROWS.min(row_count - first)).step_by(8) {
                     let rows = &mut work.rows[first + row..][..8];
                     let mut vector = 0;
                     while vector + 3 <= vectors {
-                        product::<S, T, 4, 3>(simd, panel, top, row, vector, rows);
-                        product::<S, T, 4, 3>(simd, panel, top, row + 4, vector, &mut rows[4..]);
+                        product::<S, P::Real, 4, 3>(simd, panel, top, row, vector, rows);
+                        product::<S, P::Real, 4, 3>(
+                            simd,
+                            panel,
+                            top,
+                            row + 4,
+                            vector,
+                            &mut rows[4..],
+                        );
                         vector += 3;
                     }
                     match vectors - vector {
                         0 => {}
-                        1 => product::<S, T, 8, 1>(simd, panel, top, row, vector, rows),
+                        1 => product::<S, P::Real, 8, 1>(simd, panel, top, row, vector, rows),
                         _ => {
-                            product::<S, T, 4, 2>(simd, panel, top, row, vector, rows);
-                            product::<S, T, 4, 2>(
+                            product::<S, P::Real, 4, 2>(simd, panel, top, row, vector, rows);
+                            product::<S, P::Real, 4, 2>(
                                 simd,
                                 panel,
                                 top,

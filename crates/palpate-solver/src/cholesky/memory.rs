@@ -2,6 +2,7 @@
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
 
+use super::block_float::BlockFloat;
 use super::multifrontal::Fronts;
 use super::packed::Panel;
 use super::probe::ProbeMemory;
@@ -17,6 +18,7 @@ pub(super) struct Memory {
     pub(super) fronts: Fronts,
     pub(super) probe: ProbeMemory,
     pub(super) contributions: Spare<Column>,
+    pub(super) block_float: Spare<BlockFloat>,
     pub(super) single: Spare<Panel<f32>>,
     pub(super) double: Spare<Panel<f64>>,
 }
@@ -46,6 +48,7 @@ impl Memory {
     /// Gives back to the system what no factor has taken.
     pub(super) fn trim(&mut self) {
         self.contributions.0.clear();
+        self.block_float.0.clear();
         self.single.0.clear();
         self.double.0.clear();
     }

@@ -14,8 +14,8 @@ use super::elimination::eliminate;
 use super::finish::{Finish, Piece};
 use super::front::{Front, Shape};
 use super::memory::Spare;
-use super::packed::{PackedFactor, Panel};
-use super::real::Real;
+use super::packed::PackedFactor;
+use super::stored::Stored;
 use super::supernodes::Supernodes;
 use super::tiles::{Block, Column};
 use crate::BlockMatrix;
@@ -59,15 +59,15 @@ impl Stack {
 impl Fronts {
     /// Factors a matrix in spare memory; the column of a pivot that is not positive if there is one. All
     /// is done in double precision but for what each supernode is turned into when it is finished.
-    pub(super) fn factor<T: Real>(
+    pub(super) fn factor<P: Stored>(
         &mut self,
         supernodes: &Supernodes,
         matrix: &BlockMatrix,
-        plan: &mut Plan<T>,
-        spare: &mut Spare<Panel<T>>,
+        plan: &mut Plan<P>,
+        spare: &mut Spare<P>,
         spare_contributions: &mut Spare<Column>,
-    ) -> Result<PackedFactor<T>, usize> {
-        let mut finish = Finish::default();
+    ) -> Result<PackedFactor<P>, usize> {
+        let (mut finish, mut panel_memory) = (Finish::default(), Vec::new());
         for stack in &mut self.stacks {
             stack.used = 0;
         }
@@ -89,8 +89,10 @@ impl Fronts {
                 let panels = if let Some(pieces) = plan.known[s] {
                     Arc::clone(&pieces[index].panels)
                 } else {
-                    let mut panels = spare.take(piece.shape.panel_count(), Panel::ZERO);
-                    finish.finish(shape, piece, &self.columns, &self.inverses, &mut panels);
+                    let mut panels = spare.take(piece.shape.panel_count(), P::ZERO);
+                    P::fill(&mut panels, &mut panel_memory, |panels| {
+                        finish.finish(shape, piece, &self.columns, &self.inverses, panels);
+                    });
                     Arc::new(panels)
                 };
                 let own = nodes.end as u32..supernodes.nodes(s).end as u32;
@@ -104,12 +106,12 @@ impl Fronts {
 
     /// Puts the front of a supernode together and eliminates its columns. What they leave goes to the
     /// memory in which it is `kept`, which is returned, or on a stack.
-    fn eliminate<T>(
+    fn eliminate<P>(
         &mut self,
         supernodes: &Supernodes,
         matrix: &BlockMatrix,
         s: usize,
-        plan: &Plan<T>,
+        plan: &Plan<P>,
         mut kept: Option<Vec<Column>>,
     ) -> Result<Option<Contribution>, usize> {
         let shape = shape(supernodes, s);

@@ -15,31 +15,29 @@ use pulp::Simd;
 
 use super::memory::Spare;
 use super::real::Real;
+use super::stored::Stored;
 
 /// Rows of a panel: one to eight vectors of any machine and precision.
 pub(super) const ROWS: usize = 32;
 /// Running sums per column in the backward pass: the longest vector.
-const LANES: usize = 16;
+pub(super) const LANES: usize = 16;
 
+/// A column of a panel as numbers.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub(super) struct Panel<T>(pub(super) [T; ROWS]);
 
-impl<T: Real> Panel<T> {
-    pub(super) const ZERO: Self = Self([T::ZERO; ROWS]);
-}
-
 #[derive(Debug)]
-pub(super) struct Supernode<T> {
+pub(super) struct Supernode<P> {
     start: u32,
     width: u32,
     pattern_start: u32,
     pattern_end: u32,
     /// Those of a supernode that a change has left alone are the same in both factors.
-    pub(super) panels: Arc<Vec<Panel<T>>>,
+    pub(super) panels: Arc<Vec<P>>,
 }
 
-impl<T> Supernode<T> {
+impl<P> Supernode<P> {
     pub(super) fn columns(&self) -> std::ops::Range<usize> {
         self.start as usize..(self.start + self.width) as usize
     }
@@ -54,15 +52,21 @@ impl<T> Supernode<T> {
 }
 
 /// The packed factor of one matrix.
-#[derive(Debug, Default)]
-pub(super) struct PackedFactor<T> {
-    pub(super) supernodes: Vec<Supernode<T>>,
+#[derive(Debug)]
+pub(super) struct PackedFactor<P> {
+    pub(super) supernodes: Vec<Supernode<P>>,
     pub(super) pattern: Vec<u32>,
     /// Rows and columns.
     pub(super) size: usize,
-    widest: usize,
+    pub(super) widest: usize,
     /// Rows of the longest supernode, whole panels.
     pub(super) longest: usize,
+}
+
+impl<P> Default for PackedFactor<P> {
+    fn default() -> Self {
+        Self { supernodes: Vec::new(), pattern: Vec::new(), size: 0, widest: 0, longest: 0 }
+    }
 }
 
 /// Memory for solves with one packed factor, for one thread.
@@ -74,14 +78,14 @@ pub(super) struct PackedWorkspace<T> {
     sums: Vec<[T; LANES]>,
 }
 
-impl<T: Real> PackedFactor<T> {
+impl<P: Stored> PackedFactor<P> {
     /// A factor of `size` columns without any supernode.
     pub(super) fn new(size: usize) -> Self {
         Self { size, ..Self::default() }
     }
 
     /// Leaves its panels as memory.
-    pub(super) fn clear(&mut self, spare: &mut Spare<Panel<T>>) {
+    pub(super) fn clear(&mut self, spare: &mut Spare<P>) {
         std::mem::take(self).supernodes.into_iter().for_each(|s| spare.give(s.panels));
     }
 
@@ -91,7 +95,7 @@ impl<T: Real> PackedFactor<T> {
         start: u32,
         width: usize,
         rows: impl Iterator<Item = u32>,
-        panels: Arc<Vec<Panel<T>>>,
+        panels: Arc<Vec<P>>,
     ) {
         let pattern_start = self.pattern.len() as u32;
         self.pattern.extend(rows);
@@ -113,27 +117,27 @@ impl<T: Real> PackedFactor<T> {
     }
 
     /// Makes the memory large enough; it is so after the first time.
-    pub(super) fn fit(&self, work: &mut PackedWorkspace<T>) {
-        work.x.resize(3 * self.size, T::ZERO);
-        work.top.resize(3 * self.widest, T::ZERO);
-        work.rows.resize(3 * self.longest, T::ZERO);
-        work.sums.resize(3 * self.widest, [T::ZERO; LANES]);
+    pub(super) fn fit(&self, work: &mut PackedWorkspace<P::Real>) {
+        work.x.resize(3 * self.size, P::Real::ZERO);
+        work.top.resize(3 * self.widest, P::Real::ZERO);
+        work.rows.resize(3 * self.longest, P::Real::ZERO);
+        work.sums.resize(3 * self.widest, [P::Real::ZERO; LANES]);
     }
 
     pub(super) fn solve_in_place(
         &self,
         order: &[u32],
         rhs: &mut [[f64; 3]],
-        work: &mut PackedWorkspace<T>,
+        work: &mut PackedWorkspace<P::Real>,
     ) {
         assert_eq!(rhs.len(), order.len(), "one entry per node");
         self.fit(work);
         for (x, &node) in work.x.as_chunks_mut::<3>().0.iter_mut().zip(order) {
-            *x = rhs[node as usize].map(T::from_f64);
+            *x = rhs[node as usize].map(P::Real::from_f64);
         }
-        pulp::Arch::new().dispatch(Passes::<T, 1> { factor: self, work });
+        pulp::Arch::new().dispatch(Passes::<P, 1> { factor: self, work });
         for (x, &node) in work.x.as_chunks::<3>().0.iter().zip(order) {
-            rhs[node as usize] = x.map(T::to_f64);
+            rhs[node as usize] = x.map(P::Real::to_f64);
         }
     }
 
@@ -142,15 +146,15 @@ impl<T: Real> PackedFactor<T> {
         order: &[u32],
         first: &mut [[f64; 3]],
         second: &mut [[f64; 3]],
-        work: &mut PackedWorkspace<T>,
+        work: &mut PackedWorkspace<P::Real>,
     ) {
         assert!(first.len() == order.len() && second.len() == order.len(), "one entry per node");
         self.fit(work);
         for (x, &node) in work.x.as_chunks_mut::<6>().0.iter_mut().zip(order) {
             let sides = [&first[node as usize], &second[node as usize]];
-            *x = std::array::from_fn(|entry| T::from_f64(sides[entry % 2][entry / 2]));
+            *x = std::array::from_fn(|entry| P::Real::from_f64(sides[entry % 2][entry / 2]));
         }
-        pulp::Arch::new().dispatch(Passes::<T, 2> { factor: self, work });
+        pulp::Arch::new().dispatch(Passes::<P, 2> { factor: self, work });
         for (x, &node) in work.x.as_chunks::<6>().0.iter().zip(order) {
             first[node as usize] = std::array::from_fn(|axis| x[2 * axis].to_f64());
             second[node as usize] = std::array::from_fn(|axis| x[2 * axis + 1].to_f64());
@@ -161,15 +165,15 @@ impl<T: Real> PackedFactor<T> {
         &self,
         order: &[u32],
         sides: &mut [[f64; 9]],
-        work: &mut PackedWorkspace<T>,
+        work: &mut PackedWorkspace<P::Real>,
     ) {
         assert_eq!(sides.len(), order.len(), "one entry per node");
         self.fit(work);
         for (x, &node) in work.x.as_chunks_mut::<9>().0.iter_mut().zip(order) {
             let side = &sides[node as usize];
-            *x = std::array::from_fn(|entry| T::from_f64(side[3 * (entry % 3) + entry / 3]));
+            *x = std::array::from_fn(|entry| P::Real::from_f64(side[3 * (entry % 3) + entry / 3]));
         }
-        pulp::Arch::new().dispatch(Passes::<T, 3> { factor: self, work });
+        pulp::Arch::new().dispatch(Passes::<P, 3> { factor: self, work });
         for (x, &node) in work.x.as_chunks::<9>().0.iter().zip(order) {
             let value = |entry: usize| x[3 * (entry % 3) + entry / 3].to_f64();
             sides[node as usize] = std::array::from_fn(value);
@@ -178,13 +182,13 @@ impl<T: Real> PackedFactor<T> {
 
     #[allow(clippy::inline_always)] // compiled for the vector unit that `dispatch` found
     #[inline(always)]
-    fn forward<S: Simd, const K: usize>(&self, simd: S, work: &mut PackedWorkspace<T>) {
+    fn forward<S: Simd, const K: usize>(&self, simd: S, work: &mut PackedWorkspace<P::Real>) {
         let x = work.x.as_chunks_mut::<K>().0;
         for supernode in &self.supernodes {
             let width = supernode.width as usize;
             let top = &mut work.top.as_chunks_mut::<K>().0[..width];
             top.copy_from_slice(&x[supernode.columns()]);
-            if top.as_flattened().iter().all(|&value| value == T::ZERO) {
+            if top.as_flattened().iter().all(|&value| value == P::Real::ZERO) {
                 continue;
             }
             let rows = work.rows.as_chunks_mut::<K>().0;
@@ -192,7 +196,7 @@ impl<T: Real> PackedFactor<T> {
             for first in (0..supernode.row_count()).step_by(ROWS) {
                 let (panel, rest) = panels.split_at(width.min(first + ROWS));
                 panels = rest;
-                let sums = panel_product::<S, T, K>(simd, panel, top);
+                let sums = P::product::<S, K>(simd, panel, top);
                 for (lane, row) in rows[first..first + ROWS].iter_mut().enumerate() {
                     for k in 0..K {
                         row[k] = sums[k][lane];
@@ -212,7 +216,7 @@ impl<T: Real> PackedFactor<T> {
 
     #[allow(clippy::inline_always)] // as `forward`
     #[inline(always)]
-    fn backward<S: Simd, const K: usize>(&self, simd: S, work: &mut PackedWorkspace<T>) {
+    fn backward<S: Simd, const K: usize>(&self, simd: S, work: &mut PackedWorkspace<P::Real>) {
         let x = work.x.as_chunks_mut::<K>().0;
         for supernode in self.supernodes.iter().rev() {
             let width = supernode.width as usize;
@@ -222,28 +226,28 @@ impl<T: Real> PackedFactor<T> {
             let row_count = supernode.row_count();
             for (value, &row) in rows[width..row_count].iter_mut().zip(pattern) {
                 for k in 0..K {
-                    value[k] = T::ZERO - x[row as usize][k];
+                    value[k] = P::Real::ZERO - x[row as usize][k];
                 }
             }
-            rows[row_count..row_count.next_multiple_of(ROWS)].fill([T::ZERO; K]);
+            rows[row_count..row_count.next_multiple_of(ROWS)].fill([P::Real::ZERO; K]);
             let sums = &mut work.sums[..K * width];
-            sums.fill([T::ZERO; LANES]);
+            sums.fill([P::Real::ZERO; LANES]);
             let mut panels = &supernode.panels[..];
             for first in (0..row_count).step_by(ROWS) {
                 let (panel, rest) = panels.split_at(width.min(first + ROWS));
                 panels = rest;
-                let mut values = [[T::ZERO; ROWS]; K];
+                let mut values = [[P::Real::ZERO; ROWS]; K];
                 for (lane, row) in rows[first..first + ROWS].iter().enumerate() {
                     for k in 0..K {
                         values[k][lane] = row[k];
                     }
                 }
                 let sums = sums.as_chunks_mut::<K>().0;
-                add_transposed_product::<S, T, K>(simd, panel, &values, sums);
+                P::add_transposed_product::<S, K>(simd, panel, &values, sums);
             }
             for (value, sums) in x[supernode.columns()].iter_mut().zip(sums.as_chunks::<K>().0) {
                 for k in 0..K {
-                    value[k] = sums[k].iter().fold(T::ZERO, |sum, &part| sum + part);
+                    value[k] = sums[k].iter().fold(P::Real::ZERO, |sum, &part| sum + part);
                 }
             }
         }
@@ -251,12 +255,12 @@ impl<T: Real> PackedFactor<T> {
 }
 
 /// Both passes of a solve, for the vector unit that the machine has.
-struct Passes<'a, T, const K: usize> {
-    factor: &'a PackedFactor<T>,
-    work: &'a mut PackedWorkspace<T>,
+struct Passes<'a, P: Stored, const K: usize> {
+    factor: &'a PackedFactor<P>,
+    work: &'a mut PackedWorkspace<P::Real>,
 }
 
-impl<T: Real, const K: usize> pulp::WithSimd for Passes<'_, T, K> {
+impl<P: Stored, const K: usize> pulp::WithSimd for Passes<'_, P, K> {
     type Output = ();
 
     #[allow(clippy::inline_always)] // as `forward`
@@ -264,78 +268,5 @@ impl<T: Real, const K: usize> pulp::WithSimd for Passes<'_, T, K> {
     fn with_simd<S: Simd>(self, simd: S) {
         self.factor.forward::<S, K>(simd, self.work);
         self.factor.backward::<S, K>(simd, self.work);
-    }
-}
-
-/// `panel * top` for the rows of one panel.
-#[allow(clippy::inline_always)] // as `forward`
-#[inline(always)]
-fn panel_product<S: Simd, T: Real, const K: usize>(
-    simd: S,
-    panel: &[Panel<T>],
-    top: &[[T; K]],
-) -> [[T; ROWS]; K] {
-    let mut result = [[T::ZERO; ROWS]; K];
-    let count = ROWS / T::lanes::<S>();
-    let mut first = 0;
-    // As many chains at once as hide the latency of a multiplication and fit in the registers.
-    if K == 1 {
-        while first + 4 <= count {
-            rows_product::<S, T, K, 4>(simd, panel, top, first, &mut result);
-            first += 4;
-        }
-    }
-    while first + 2 <= count {
-        rows_product::<S, T, K, 2>(simd, panel, top, first, &mut result);
-        first += 2;
-    }
-    result
-}
-
-/// `panel * top` for `G` vectors of rows from vector `first` on.
-#[allow(clippy::inline_always)] // as `forward`
-#[inline(always)]
-fn rows_product<S: Simd, T: Real, const K: usize, const G: usize>(
-    simd: S,
-    panel: &[Panel<T>],
-    top: &[[T; K]],
-    first: usize,
-    result: &mut [[T; ROWS]; K],
-) {
-    let mut sums = [[T::splat(simd, T::ZERO); G]; K];
-    for (column, factor) in panel.iter().zip(top) {
-        let column = &T::vectors::<S>(&column.0)[first..first + G];
-        for k in 0..K {
-            let factor = T::splat(simd, factor[k]);
-            for i in 0..G {
-                sums[k][i] = T::mul_add(simd, column[i], factor, sums[k][i]);
-            }
-        }
-    }
-    for k in 0..K {
-        T::vectors_mut::<S>(&mut result[k])[first..first + G].copy_from_slice(&sums[k]);
-    }
-}
-
-/// Adds `panel^T * values` to the running sums of each column.
-#[allow(clippy::inline_always)] // as `forward`
-#[inline(always)]
-fn add_transposed_product<S: Simd, T: Real, const K: usize>(
-    simd: S,
-    panel: &[Panel<T>],
-    values: &[[T; ROWS]; K],
-    sums: &mut [[[T; LANES]; K]],
-) {
-    let per_sum = LANES / T::lanes::<S>();
-    for (column, sums) in panel.iter().zip(sums) {
-        let column = T::vectors::<S>(&column.0);
-        for (sums, values) in sums.iter_mut().zip(values) {
-            let sums = T::vectors_mut::<S>(sums);
-            let values = T::vectors::<S>(values);
-            for i in 0..per_sum {
-                let half = T::mul_add(simd, column[i], values[i], sums[i]);
-                sums[i] = T::mul_add(simd, column[i + per_sum], values[i + per_sum], half);
-            }
-        }
     }
 }

@@ -10,6 +10,10 @@ const TOLERANCE: f64 = 1e-6;
 /// beyond them, it is kept in double precision. Rounding the soft part of a solution leaves a
 /// residual in the stiff part, where it moves nothing: the error is a thousandth of it.
 const SINGLE_TOLERANCES: [f64; 2] = [1e-2, 1e-5];
+/// Largest error of a factor kept in sixteen bits, relative to the solution, both in the norm of the
+/// matrix; beyond it, it is kept in single precision. That of the worst right-hand side was up to forty times this
+/// one's.
+const BLOCK_FLOAT_TOLERANCE: f64 = 1e-2;
 
 /// Memory for probes.
 #[derive(Default)]
@@ -17,6 +21,7 @@ pub(super) struct ProbeMemory {
     rhs: Vec<[f64; 3]>,
     solution: Vec<[f64; 3]>,
     residual: Vec<[f64; 3]>,
+    error: Vec<[f64; 3]>,
     workspace: SolveWorkspace,
 }
 
@@ -26,11 +31,13 @@ pub(super) struct Probe {
     pub(super) residual: f64,
     /// Estimated, relative to the solution.
     error: f64,
+    /// The same in the norm of the matrix.
+    energy_error: f64,
 }
 
 impl Probe {
     pub(super) fn new(factor: &Cholesky, matrix: &BlockMatrix, memory: &mut ProbeMemory) -> Self {
-        let ProbeMemory { rhs, solution, residual, workspace } = memory;
+        let ProbeMemory { rhs, solution, residual, error, workspace } = memory;
         let count = factor.node_count();
         let mut state = 1_u32;
         let mut draw = || {
@@ -46,10 +53,19 @@ impl Probe {
         for (p, r) in residual.as_flattened_mut().iter_mut().zip(rhs.as_flattened()) {
             *p -= r;
         }
-        let norm = |v: &[[f64; 3]]| v.as_flattened().iter().map(|x| x * x).sum::<f64>().sqrt();
-        let left = norm(residual) / norm(rhs);
-        factor.solve_in_place(residual, workspace);
-        Self { residual: left, error: norm(residual) / norm(solution) }
+        let dot = |a: &[[f64; 3]], b: &[[f64; 3]]| {
+            let pairs = a.as_flattened().iter().zip(b.as_flattened());
+            pairs.map(|(a, b)| a * b).sum::<f64>()
+        };
+        let ratio = |part: f64, whole: f64| (part / whole).sqrt();
+        let left = ratio(dot(residual, residual), dot(rhs, rhs));
+        error.clone_from(residual);
+        factor.solve_in_place(error, workspace);
+        Self {
+            residual: left,
+            error: ratio(dot(error, error), dot(solution, solution)),
+            energy_error: ratio(dot(residual, error), dot(rhs, solution)),
+        }
     }
 
     /// Whether a factor in double precision is of use.
@@ -60,5 +76,10 @@ impl Probe {
     /// Whether one in single precision is.
     pub(super) fn is_accurate_in_single(&self) -> bool {
         self.residual < SINGLE_TOLERANCES[0] && self.error < SINGLE_TOLERANCES[1]
+    }
+
+    /// Whether one in sixteen bits is.
+    pub(super) fn is_accurate_in_block_float(&self) -> bool {
+        self.energy_error < BLOCK_FLOAT_TOLERANCE
     }
 }

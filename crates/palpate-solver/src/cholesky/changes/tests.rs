@@ -5,8 +5,10 @@ use std::sync::Arc;
 
 use proptest::prelude::*;
 
+use crate::cholesky::packed::Panel;
 use crate::cholesky::packed::{PackedFactor, Supernode};
 use crate::cholesky::real::Real;
+use crate::cholesky::stored::Stored;
 use crate::cholesky::{Cholesky, FactorError, HalfSolution, Packed, Precision};
 use crate::{BlockMatrix, BlockPattern, NodeOrder};
 
@@ -219,9 +221,11 @@ fn grid(n: u32) -> Mesh {
     mesh
 }
 
-fn same_bits<T: Real>(a: &PackedFactor<T>, b: &PackedFactor<T>) -> bool {
-    let entries = |s: &Supernode<T>| -> Vec<u64> {
-        s.panels.iter().flat_map(|panel| panel.0).map(|x| x.to_f64().to_bits()).collect()
+fn same_bits<P: Stored>(a: &PackedFactor<P>, b: &PackedFactor<P>) -> bool {
+    let entries = |s: &Supernode<P>| -> Vec<u64> {
+        let mut memory = vec![Panel::<P::Real>::ZERO; P::memory_columns(s.panels.len())];
+        let panels = P::panel(&s.panels, &mut memory);
+        panels.iter().flat_map(|panel| panel.0).map(|x| x.to_f64().to_bits()).collect()
     };
     a.pattern == b.pattern
         && a.supernodes.len() == b.supernodes.len()
@@ -233,6 +237,7 @@ fn same_bits<T: Real>(a: &PackedFactor<T>, b: &PackedFactor<T>) -> bool {
 fn assert_same(changed: &Cholesky, fresh: &Cholesky) {
     assert_eq!(changed.order.nodes, fresh.order.nodes);
     match (&changed.packed, &fresh.packed) {
+        (Packed::BlockFloat(a), Packed::BlockFloat(b)) => assert!(same_bits(a, b)),
         (Packed::Single(a), Packed::Single(b)) => assert!(same_bits(a, b)),
         (Packed::Double(a), Packed::Double(b)) => assert!(same_bits(a, b)),
         _ => panic!("kept in another precision"),
@@ -278,7 +283,8 @@ impl History {
             self.mesh.number(name).or_else(of_copy)
         };
         let origins: Vec<Option<u32>> = mesh.nodes.iter().map(origin).collect();
-        let changed = self.factor.changed(&matrix, mesh.order(&matrix), &origins);
+        let changed =
+            self.factor.changed(&matrix, self.factor.precision, mesh.order(&matrix), &origins);
         match (changed, Cholesky::in_order(&matrix, self.factor.precision, mesh.order(&matrix))) {
             (Ok(changed), Ok(fresh)) => {
                 assert_same(&changed, &fresh);
@@ -297,7 +303,7 @@ proptest! {
         node_count in 1_u32..40,
         elements in prop::collection::vec((any::<[u32; 4]>(), any::<u64>()), 0..60),
         history in prop::collection::vec(changes(), 1..8),
-        is_single in any::<bool>(),
+        precision in 0_usize..3,
     ) {
         let nodes: Vec<u32> = (0..node_count).collect();
         let element = |&(nodes, seed): &([u32; 4], u64)| {
@@ -310,7 +316,7 @@ proptest! {
             next_name: node_count,
             ..Mesh::default()
         };
-        let precision = if is_single { Precision::Single } else { Precision::Double };
+        let precision = [Precision::Double, Precision::Single, Precision::BlockFloat][precision];
         let mut factor = History::new(mesh, precision);
         for changes in &history {
             factor.change(changes);
@@ -324,9 +330,9 @@ proptest! {
     #[test]
     fn local_changes_of_a_body_give_the_bits_of_a_new_factor(
         history in prop::collection::vec(changes(), 1..6),
-        is_single in any::<bool>(),
+        precision in 0_usize..3,
     ) {
-        let precision = if is_single { Precision::Single } else { Precision::Double };
+        let precision = [Precision::Double, Precision::Single, Precision::BlockFloat][precision];
         let mut factor = History::new(grid(6), precision);
         for changes in &history {
             factor.change(changes);
@@ -367,11 +373,11 @@ fn only_what_a_change_touches_is_computed() {
 
 #[test]
 fn a_factor_goes_on_after_a_change_that_fails_and_after_another_matrix() {
-    let mut history = History::new(grid(5), Precision::Single);
+    let mut history = History::new(grid(5), Precision::BlockFloat);
     history.change(&[Change::Split(3, 1)]);
     let matrix = history.mesh.matrix();
     let fresh =
-        Cholesky::in_order(&matrix, Precision::Single, history.mesh.order(&matrix)).unwrap();
+        Cholesky::in_order(&matrix, Precision::BlockFloat, history.mesh.order(&matrix)).unwrap();
     history.change(&[Change::Split(60, 5), Change::Unstable(60)]);
     assert_same(&history.factor, &fresh);
     history.change(&[Change::Split(40, 2)]);
