@@ -6,8 +6,8 @@ mod failure;
 mod hands;
 mod patch;
 mod substeps;
+mod tasks;
 
-use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
@@ -29,6 +29,7 @@ pub use change::ChangedBody;
 pub use drive::Drive;
 use drive::Drives;
 pub use failure::{Cause, Failure};
+use tasks::{assign_tasks, cost};
 
 /// Motion margin of a search, in mean edges of the finer deformable surface: contacts farther
 /// ahead are found in a later step, or as penetrations.
@@ -202,7 +203,9 @@ impl Dynamics {
         }
         let mut places = Vec::with_capacity(bodies.len());
         let mut counts = vec![0; options.threads.max(1)];
-        for task in assign_tasks(model, options.threads.max(1)) {
+        let costs =
+            model.bodies.iter().zip(&bodies).map(|(body, moving)| (body.processor, cost(moving)));
+        for task in assign_tasks(costs, options.threads.max(1)) {
             places.push((task as u32, counts[task]));
             counts[task] += 1;
         }
@@ -765,31 +768,4 @@ fn check_array(
         Some(node) => Err(MechanicsError::NotFinite { body, node, what }),
         None => Ok(()),
     }
-}
-
-/// The task of each body: the bodies of one processor that the model names stay together, and
-/// processors, like bodies without one, go, largest first, to the task with the fewest nodes.
-fn assign_tasks(model: &Model, threads: usize) -> Vec<usize> {
-    let mut groups: Vec<(usize, Vec<usize>)> = Vec::new();
-    let mut group_of = BTreeMap::new();
-    for (index, body) in model.bodies.iter().enumerate() {
-        let own = groups.len();
-        let group = body.processor.map_or(own, |id| *group_of.entry(id).or_insert(own));
-        if group == own {
-            groups.push((0, Vec::new()));
-        }
-        groups[group].0 += body.mesh.nodes().len();
-        groups[group].1.push(index);
-    }
-    groups.sort_by_key(|&(nodes, _)| std::cmp::Reverse(nodes));
-    let mut load = vec![0; threads];
-    let mut task_of = vec![0; model.bodies.len()];
-    for (nodes, bodies) in groups {
-        let task = (0..threads).min_by_key(|&task| load[task]).expect("at least one thread");
-        load[task] += nodes;
-        for body in bodies {
-            task_of[body] = task;
-        }
-    }
-    task_of
 }
