@@ -30,6 +30,9 @@ const MAX_HELD_ITERATIONS: usize = 2;
 const SHRINKING: f64 = 0.5;
 /// Moves smaller than this, in mean edges, are not worth another solve for the contact forces.
 const SETTLED: f64 = 0.1;
+/// Between passes that move a node by more than this, in mean edges, what was learned of the tissue is
+/// forgotten: what is crushed is another tissue in every pass.
+const FAMILIAR: f64 = 1.5;
 /// Iterations of a step, or solves for its contact forces, after which A is made anew.
 const SLOW: u32 = 6;
 /// The same when a node has moved by more than this part of the body's radius since, apart from the
@@ -429,8 +432,12 @@ impl ElasticBody {
         let enough = SETTLED * method.mean_edge;
         let squares = self.step.response.iter().map(|r| DVec3::from_array(*r).length_squared());
         let response = squares.fold(0.0, f64::max).sqrt();
-        if method.longest.max(response) <= enough {
+        let moved = method.longest.max(response);
+        if moved <= enough {
             return false;
+        }
+        if moved > FAMILIAR * method.mean_edge {
+            method.known = 0;
         }
         for (d, r) in self.step.correction.iter_mut().zip(&mut self.step.response) {
             *d = std::array::from_fn(|k| d[k] + r[k]);
