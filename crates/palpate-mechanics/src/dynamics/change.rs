@@ -22,26 +22,11 @@ pub struct ChangedBody {
 
 impl ChangedBody {
     /// Makes what becomes of body `index` by `change`, in steps of `time_step` [s]: `model` is the model after the
-    /// change, `basis` what the body was. Its responses to contact where it was touched are solved for.
+    /// change, `basis` what the body was.
     ///
     /// # Errors
     /// If the body cannot be simulated.
     pub fn new(
-        model: &Model,
-        index: usize,
-        change: &MeshChange,
-        basis: &BodyBasis,
-        time_step: f64,
-    ) -> Result<Self, MechanicsError> {
-        let mut made = Self::make(model, index, change, basis, time_step)?;
-        let nodes = made.body.prepare_as_before(basis, change);
-        if let Some(elastic) = made.body.elastic() {
-            made.compliance.gather(elastic, &made.body.compliance, &nodes);
-        }
-        Ok(made)
-    }
-
-    fn make(
         model: &Model,
         index: usize,
         change: &MeshChange,
@@ -57,6 +42,17 @@ impl ChangedBody {
             surface: Surface::new(&body.mesh),
             compliance: NodeCompliance::default(),
         })
+    }
+
+    /// With its responses to contact solved for, where it was touched and where `change` opened it: the next
+    /// step would do so otherwise, to the same bits.
+    #[must_use]
+    pub fn prepared(mut self, basis: &BodyBasis, change: &MeshChange) -> Self {
+        let nodes = self.body.prepare_as_before(basis, change);
+        if let Some(elastic) = self.body.elastic() {
+            self.compliance.gather(elastic, &self.body.compliance, &nodes);
+        }
+        self
     }
 }
 
@@ -80,7 +76,7 @@ impl Dynamics {
         change: &MeshChange,
     ) -> Result<Vec<u64>, MechanicsError> {
         let (basis, time_step) = (self.basis(index), self.options.time_step);
-        let changed = ChangedBody::make(model, index, change, &basis, time_step)?;
+        let changed = ChangedBody::new(model, index, change, &basis, time_step)?;
         let (released, before) = self.replace_body(changed, model, change);
         self.body_mut(index).take_memory(before);
         Ok(released)

@@ -291,7 +291,9 @@ impl Preparation {
         for change in changes.into_iter().flatten() {
             let body = change.body;
             model = Arc::new(model.changed(body, &change.change));
-            let made = ChangedBody::new(&model, body, &change.change, &bases[body], time_step)?;
+            let basis = &bases[body];
+            let made = ChangedBody::new(&model, body, &change.change, basis, time_step)?
+                .prepared(basis, &change.change);
             bodies.push(OpenedBody { change, made, model: Arc::clone(&model) });
         }
         times.mechanics = begin.elapsed();
