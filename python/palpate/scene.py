@@ -318,7 +318,8 @@ class Scene:
         body : int or str, optional
             The only body to look at.
         max_distance : float
-            Points farther than this [m] from any surface get no answer.
+            Points farther than this [m] from any surface get no answer; nor do those whose squared
+            distance overflows.
         """
         return ClosestPoints(*self._core.closest(*self._query(body, max_distance, points=points)))
 

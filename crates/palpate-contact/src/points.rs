@@ -50,7 +50,9 @@ impl Among<'_> {
         });
         let Closest { body, triangle, weights, distance_squared } = search.best?;
         let distance = distance_squared.sqrt();
-        (distance <= within).then(|| self.point(body, triangle, weights, distance))
+        // Where squares overflow, which triangle is closest cannot be told.
+        (distance <= within && distance < f64::INFINITY)
+            .then(|| self.point(body, triangle, weights, distance))
     }
 
     /// The first hit of a ray that is at most `within` \[m\] away.

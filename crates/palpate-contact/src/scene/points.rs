@@ -8,7 +8,8 @@ use crate::points::{Among, Ray, SurfacePoint, for_each_point};
 
 impl Scene {
     /// The surface point closest to each of `points` \[m\], of one body or of all; `None` where none is
-    /// at most `max_distance` \[m\] away. Of equals, that of the smallest (body, triangle).
+    /// at most `max_distance` \[m\] away, or all are so far that the square of the distance overflows. Of
+    /// equals, that of the smallest (body, triangle).
     ///
     /// # Errors
     /// If a coordinate is not finite, `max_distance` is negative or NaN, or there is no such body.

@@ -152,6 +152,18 @@ fn inside_is_where_the_surface_winds_around() {
     assert!(told > 1000 && inner > 100, "{inner} of {told}");
 }
 
+#[test]
+fn what_is_too_far_to_be_measured_is_not_found() {
+    let meshes = [block([1, 1, 1], |p| p), block([2, 1, 1], |p| p.map(|x| x + 3.0))];
+    let points = [[1e200, 0.0, 0.0], [0.0, -1e155, 0.0], [1e153, 0.0, 0.0]];
+    for options in every_way() {
+        let mut scene = scene(&meshes, options);
+        let found = scene.closest(&points, None, f64::INFINITY).expect("finite points");
+        let distances: Vec<_> = found.iter().map(|found| found.map(|it| it.distance)).collect();
+        assert_eq!(distances, [None, None, Some(1e153)], "{options:?}");
+    }
+}
+
 /// Distance along a ray to a triangle that it does not graze, by Cramer's rule.
 fn plain_hit(origin: Point, direction: Point, [a, b, c]: [Point; 3]) -> Option<f64> {
     let (u, v, w) = (vec3::sub(b, a), vec3::sub(c, a), vec3::sub(origin, a));
