@@ -58,8 +58,8 @@ soak: ## Compare with the double loop on fresh random scenes for MINUTES (10)
 	PALPATE_SOAK=$(or $(MINUTES),10) cargo test --release --locked -p palpate-contact \
 		--test soak --test wide -- --nocapture
 
-soak-mechanics: install ## Pull, push and cut the organs of case 2 at random for MINUTES (10)
-	$(BIN)/python -m palpate.bench.verification.soak $(or $(MINUTES),10) $(SEED)
+soak-mechanics: install ## Pull, push and cut the organs of case 2 at random for MINUTES (10), at most STEPS
+	$(BIN)/python -m palpate.bench.verification.soak $(or $(MINUTES),10) $(SEED) $(addprefix --steps ,$(STEPS))
 
 FUZZ := language seg vtk blade checkpoint scene simulation
 

@@ -9,7 +9,16 @@ import numpy as np
 import pytest
 
 import palpate
-from palpate.bench.verification import elasticity, laws, motion, organs, responses, shapes, touching
+from palpate.bench.verification import (
+    elasticity,
+    laws,
+    motion,
+    organs,
+    responses,
+    shapes,
+    soak,
+    touching,
+)
 
 ALL = ("linear", *laws.ISOTROPIC, "hgo")
 
@@ -135,3 +144,27 @@ def test_a_squeezed_organ_comes_back(law):
     assert result.inverted[-1] == 0
     assert result.misfits[-1] < 0.005
     assert result.intersections == 0
+
+
+def test_a_soak_ends_after_its_steps_and_says_how_far_it_is(capsys):
+    hands = soak.Soak(7, steps=30)
+    hands.round()
+    assert hands.is_over
+    assert hands.steps >= 30
+    assert hands.faults == []
+    assert "MB in use" in capsys.readouterr().out
+
+
+def test_a_soak_tells_what_stays_not_what_passes(monkeypatch):
+    monkeypatch.setattr(soak, "LASTING", 40)
+    stays, passes = soak.Lasting(), soak.Lasting()
+    told = [step for step in range(0, 200, 20) if stays.look(step, {"a", step})]
+    assert told == [40]
+    assert not any(passes.look(step, {step, step - 20}) for step in range(0, 200, 20))
+
+
+def test_a_soak_tells_of_bodies_that_are_thrown(monkeypatch):
+    monkeypatch.setattr(soak, "TOO_FAST", 0.0)
+    hands = soak.Soak(7, steps=1)
+    hands.round()
+    assert "m/s" in hands.faults[0]

@@ -1,17 +1,21 @@
 """Random pulling, pushing and cutting of case 2 for minutes: nothing breaks, stays inside or grows.
 
-``python -m palpate.bench.verification.soak MINUTES [SEED]`` prints a line every 500 steps and ends
-with an error when a promise is broken. Rounds of hands at work begin at the start again, so that
-the first and the last of them can be compared.
+``python -m palpate.bench.verification.soak MINUTES [SEED] [--steps N]`` prints a line every 500
+steps, ends after so many minutes or steps, and with an error when a promise is broken: a number
+that is not finite, a node that stays inside another body or an element that stays turned inside
+out, bodies thrown about, a step that fails, memory or the time of a step that grow. Rounds of hands
+at work begin at the start again, so that the first and the last of them can be compared.
 """
 
 from __future__ import annotations
 
+import argparse
 import ctypes
 import gc
 import os
 import sys
 import time
+from collections.abc import Hashable, Iterable
 from pathlib import Path
 
 import numpy as np
@@ -23,10 +27,14 @@ from palpate.hands import Pull
 from palpate.mesh import Mesh
 from palpate.model import Body, Model, read_model
 from palpate.results.measures import mean_edge, signed_volumes
+from palpate.scene import Scene
 from palpate.simulation import Simulation
 
-#: A node deeper than this part of the mean edge inside another body, for as many steps, is stuck.
-DEEP, LASTING = 0.01, 600
+#: A node deeper than this part of the mean edge inside a body is looked at every so many steps.
+DEEP, LOOK = 0.01, 20
+#: What is found in every look for as many steps (5 s) lasts: a node so deep inside the same body,
+#: an element turned inside out. Hands press and pull for a second at most.
+LASTING = 300
 #: Deeper than this part of the mean edge even once, or faster [m/s], bodies were thrown about.
 TOO_DEEP, TOO_FAST = 5.0, 30.0
 #: What hands do before the next round begins, and how many of these are cuts at most.
@@ -91,10 +99,28 @@ def probe(radius: float) -> Mesh:
     return Mesh(radius * np.array(nodes), triangles=triangles)
 
 
+class Lasting:
+    """What stays, by looks at some of the steps."""
+
+    def __init__(self) -> None:
+        self._since: dict[Hashable, int] = {}
+        self._told = False
+
+    def look(self, step: int, present: Iterable[Hashable]) -> bool:
+        """Whether one of ``present`` has now been in every look for `LASTING` steps; once."""
+        self._since = {thing: self._since.get(thing, step) for thing in present}
+        lasts = step - min(self._since.values(), default=step) >= LASTING
+        told, self._told = self._told, lasts
+        return lasts and not told
+
+
 class Soak:
     """Hands at work on case 2; ``faults`` says what went wrong."""
 
-    def __init__(self, seed: int) -> None:
+    def __init__(self, seed: int, minutes: float = float("inf"), steps: int | None = None) -> None:
+        self._start = time.monotonic()
+        self._end = self._start + 60 * minutes
+        self._most = steps
         self._random = np.random.default_rng(seed)
         model = read_model("case2")
         self._soft = [body.name for body in model.bodies if body.rigid is None]
@@ -111,8 +137,11 @@ class Soak:
         self.steps = 0
         self._smaller = 0
         self._deepest = 0.0
-        self._deep_since = 0
+        self._stuck = Lasting()
+        self._turned = Lasting()
+        self._inverted = 0
         self._cuts = 0
+        self._opened = 0
         self._seconds: list[float] = []
         #: Of each round: median time of a step [s], and memory in use and resident after it [MB].
         self.rounds: list[tuple[float, float, float]] = []
@@ -121,6 +150,11 @@ class Soak:
         self.faults.append(f"step {self.steps}: {what}")
         print(self.faults[-1], flush=True)
 
+    @property
+    def is_over(self) -> bool:
+        """Whether the minutes or the steps are at an end."""
+        return time.monotonic() > self._end or (self._most is not None and self.steps >= self._most)
+
     def _step(self, count: int = 1) -> None:
         for _ in range(count):
             start = time.process_time()
@@ -128,9 +162,9 @@ class Soak:
             self._seconds.append(time.process_time() - start)
             self.steps += 1
             self._smaller += report.substeps > 1
+            self._opened += len(report.cuts)
             depth = report.max_depth / self._edge
             self._deepest = max(self._deepest, depth)
-            self._deep_since = self._deep_since + 1 if depth > DEEP else 0
             fastest = max(
                 float(np.linalg.norm(velocities, axis=1).max())
                 for body, velocities in zip(
@@ -140,23 +174,49 @@ class Soak:
             )
             if depth > TOO_DEEP or fastest > TOO_FAST:
                 self._fault(f"{depth:.1f} edges deep, {fastest:.0f} m/s")
-            if self._deep_since == LASTING:
-                self._fault(f"a node is stuck {depth:.2f} edges deep")
+            if self.steps % LOOK == 0:
+                self._look(depth)
             if self.steps % 500 == 0:
                 self._tell(depth)
 
-    def _tell(self, depth: float) -> None:
-        places = self._simulation.positions
+    def _look(self, depth: float) -> None:
+        """Whether something is wrong for longer than hands work at it."""
+        bodies, places = self._simulation.model.bodies, self._simulation.positions
         if not all(np.isfinite(x).all() for x in places):
             self._fault("a position is not finite")
-        inverted = sum(
-            int((signed_volumes(x, body.mesh.tetrahedra) <= 0).sum())
-            for x, body in zip(places, self._simulation.model.bodies, strict=True)
+        # After a cut of a body its nodes and elements are others.
+        sizes = [len(x) for x in places]
+        turned = [
+            (index, sizes[index], int(element))
+            for index, (body, x) in enumerate(zip(bodies, places, strict=True))
             if body.rigid is None
-        )
+            for element in np.flatnonzero(signed_volumes(x, body.mesh.tetrahedra) <= 0)
+        ]
+        self._inverted = len(turned)
+        deep: list[tuple[int, int, int, int]] = []
+        if depth > DEEP:
+            scene = Scene([body.mesh for body in bodies])
+            scene.update(list(places))
+            inside = scene.penetration()
+            deep = [
+                (int(a), int(b), sizes[int(a)], int(node))
+                for (a, b), node, depth in zip(
+                    inside.bodies, inside.nodes, inside.depths, strict=True
+                )
+                if depth > DEEP * self._edge
+            ]
+        if self._stuck.look(self.steps, deep):
+            self._fault(f"nodes are stuck deeper than {DEEP} edges: {deep[:5]}")
+        if self._turned.look(self.steps, turned):
+            self._fault(f"elements stay inside out: {turned[:5]}")
+
+    def _tell(self, depth: float) -> None:
+        minutes = (time.monotonic() - self._start) / 60
+        of = "" if self._most is None else f" of {self._most}"
         print(
-            f"{self.steps} steps ({self._smaller} in smaller ones), {self._cuts} cuts: "
-            f"deepest {self._deepest:.2f} edges, now {depth:.3f}, {inverted} inverted, "
+            f"{self.steps} steps{of} in {minutes:.1f} min ({self._smaller} in smaller ones), "
+            f"{self._cuts} cuts, {self._opened} of them live: "
+            f"deepest {self._deepest:.2f} edges, now {depth:.3f}, {self._inverted} inverted, "
             f"{len(self._simulation.intersections())} pairs, "
             f"{1e3 * float(np.median(self._seconds[-500:])):.1f} ms, "
             f"{in_use():.0f} MB in use of {resident():.0f}",
@@ -216,15 +276,19 @@ class Soak:
         goal = self._simulation.positions[self._index(name)][node]
         size = float(self._random.uniform(3.0, 8.0)) * self._edge
         blade = Blade.plane(goal, np.cross(goal - middle, self._direction()), size)
-        self._simulation.cut(blade, min_edge=0.1 * self._edge)
+        if self._random.random() < 0.5:
+            delay = int(self._random.integers(1, 10))
+            self._simulation.cut_live(blade, delay=delay, min_edge=0.1 * self._edge)
+        else:
+            self._simulation.cut(blade, min_edge=0.1 * self._edge)
         self._cuts += 1
 
-    def round(self, end: float) -> None:
-        """Episodes from the start until ``end`` on the clock, at most; then all begins anew."""
+    def round(self) -> None:
+        """Episodes from the start, until all is over at most; then all begins anew."""
         cuts = 0
         self._seconds.clear()
         for _ in range(EPISODES):
-            if time.monotonic() > end:
+            if self.is_over:
                 break
             kind = self._random.random()
             try:
@@ -240,8 +304,8 @@ class Soak:
                 self._fault(str(error))
                 break
         median = float(np.median(self._seconds)) if self._seconds else 0.0
-        self._deep_since = 0
         self._simulation.reset()
+        self._stuck, self._turned = Lasting(), Lasting()
         gc.collect()
         self.rounds.append((median, in_use(), resident()))
         print(f"round {len(self.rounds)}: {in_use():.0f} MB in use of {resident():.0f}", flush=True)
@@ -266,18 +330,25 @@ class Soak:
                 self.faults.append(f"{what}: {start:.4g} at first, {end:.4g} at last")
 
 
-def soak(minutes: float, seed: int) -> list[str]:
+def soak(minutes: float, seed: int, steps: int | None = None) -> list[str]:
     """What went wrong."""
-    hands = Soak(seed)
-    end = time.monotonic() + 60 * minutes
-    while time.monotonic() < end:
-        hands.round(end)
+    hands = Soak(seed, minutes, steps)
+    while not hands.is_over:
+        hands.round()
     hands.check_growth()
     print(f"{hands.steps} steps in {len(hands.rounds)} rounds, seed {seed}")
     return hands.faults
 
 
+def main(words: list[str]) -> str | None:
+    """What went wrong, in lines."""
+    parser = argparse.ArgumentParser(prog="soak", description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("minutes", type=float)
+    parser.add_argument("seed", type=int, nargs="?", default=int(time.time()))
+    parser.add_argument("--steps", type=int, help="end after so many, when that is sooner")
+    chosen = parser.parse_args(words)
+    return "\n".join(soak(chosen.minutes, chosen.seed, chosen.steps)) or None
+
+
 if __name__ == "__main__":
-    chosen = int(sys.argv[2]) if len(sys.argv) > 2 else int(time.time())
-    found = soak(float(sys.argv[1]), chosen)
-    sys.exit("\n".join(found) if found else 0)
+    sys.exit(main(sys.argv[1:]))
