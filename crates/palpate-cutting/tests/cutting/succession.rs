@@ -1,6 +1,6 @@
 //! Many random cuts of one body, one after the other.
 
-use palpate_cutting::{Blade, CutOptions, cut};
+use palpate_cutting::{Blade, CutOptions, CutReport, cut};
 use palpate_geometry::{Point, vec3};
 use palpate_model::Mesh;
 
@@ -75,6 +75,76 @@ fn cut_often(cuts: usize, cells: usize, seed: u64, options: &CutOptions) -> usiz
 fn random_cuts_leave_meshes() {
     let opened = cut_often(300, 3, 1, &CutOptions::default());
     assert!(opened > 100, "{opened}");
+}
+
+#[test]
+fn the_report_of_two_cuts_as_one_counts_both() {
+    let mesh = box_mesh([3; 3], 0.1, 7);
+    let options = CutOptions::default();
+    let first = Blade::plane([1.4, 1.5, 1.5], [1.0, 0.2, 0.1], None).unwrap();
+    let second = Blade::plane([1.5, 1.6, 1.5], [0.1, 1.0, 0.3], None).unwrap();
+    let first = checked_cut(&mesh, mesh.nodes(), &first, &options).unwrap();
+    let between = &first.change.mesh;
+    let second = checked_cut(between, &first.positions, &second, &options).unwrap();
+    let after = &second.change.mesh;
+    let (a, b) = (first.report, second.report);
+    let both = a.then(&b);
+    let change = first.change.clone().then(&second.change, &mesh);
+    assert_eq!(both.new_nodes, after.nodes().len() - mesh.nodes().len());
+    assert_eq!(both.new_tetrahedra, after.tetrahedra().len() - mesh.tetrahedra().len());
+    assert_eq!((both.pieces_before, both.pieces), (1, 4));
+    assert_eq!((a.pieces, b.pieces_before), (2, 2));
+    assert_eq!(both.split_tetrahedra, a.split_tetrahedra + b.split_tetrahedra);
+    assert!(a.split_tetrahedra > 0 && b.split_tetrahedra > 0);
+    assert_eq!(both.snapped_nodes, a.snapped_nodes + b.snapped_nodes);
+    let (p, q) = (a.smallest_quality.unwrap(), b.smallest_quality.unwrap());
+    assert_eq!(both.smallest_quality, Some(p.min(q)));
+    let volume = change.mesh.volume() / mesh.volume() - 1.0;
+    assert!((both.volume_change - volume).abs() < 1e-14, "{} {volume}", both.volume_change);
+    assert!((both.cut_area - a.cut_area - b.cut_area).abs() < 1e-14);
+    assert!(a.cut_area > 8.0 && b.cut_area > 8.0, "each is as large as a side");
+    assert_eq!(both.deviation, a.deviation.max(b.deviation));
+    assert!(a.deviation != b.deviation);
+
+    // Each number by itself, none of the others being like it.
+    let of = |n: usize, x: f64, quality| CutReport {
+        new_nodes: n,
+        new_tetrahedra: n + 1,
+        split_tetrahedra: n + 2,
+        snapped_nodes: n + 3,
+        pieces_before: n + 4,
+        pieces: n + 5,
+        smallest_quality: quality,
+        volume_change: x,
+        cut_area: x + 1.0,
+        deviation: x + 2.0,
+    };
+    let expected = |quality| CutReport {
+        new_nodes: 110,
+        new_tetrahedra: 112,
+        split_tetrahedra: 114,
+        snapped_nodes: 116,
+        pieces_before: 14,
+        pieces: 105,
+        smallest_quality: quality,
+        volume_change: 0.875,
+        cut_area: 2.75,
+        deviation: 2.5,
+    };
+    let qualities = [
+        (Some(0.2), Some(0.3), Some(0.2)),
+        (Some(0.3), Some(0.2), Some(0.2)),
+        (None, Some(0.3), Some(0.3)),
+        (Some(0.2), None, Some(0.2)),
+        (None, None, None),
+    ];
+    for (first, second, quality) in qualities {
+        assert_eq!(of(10, 0.5, first).then(&of(100, 0.25, second)), expected(quality));
+        // 10 + 100 and 100 + 10 differ in what is taken from one of them only.
+        let turned = of(100, 0.25, first).then(&of(10, 0.5, second));
+        let expected = CutReport { pieces_before: 104, pieces: 15, ..expected(quality) };
+        assert_eq!(turned, expected);
+    }
 }
 
 #[test]
