@@ -47,7 +47,8 @@ pub use bounding_tree::{BoundingTree, Split, TreeDefect, TreeStats};
 pub use pairs::{PairKind, PenetratingNode, ProximityPair, TrianglePair};
 pub use points::SurfacePoint;
 pub use scene::{
-    ContactNodes, DetectionMemory, DetectionStats, IntersectionOptions, Intersections, Method,
-    Penetration, Proximity, ProximityOptions, Scene, SceneError, SceneOptions, UpdateStats,
+    ChangedSurface, ContactNodes, DetectionMemory, DetectionStats, IntersectionOptions,
+    Intersections, Method, Penetration, Proximity, ProximityOptions, Scene, SceneError,
+    SceneOptions, SurfaceBasis, UpdateStats,
 };
 pub use threads::Threads;

@@ -14,7 +14,7 @@ use crate::proximity::Limit;
 use crate::scene::{
     DetectionMemory, Frame, IntersectionOptions, Intersections, Proximity, SceneBody,
 };
-use crate::wide::WideSurface;
+use crate::wide::{WideBody, WideSurface};
 
 /// The methods from lines of a name here, a name in words, and what works by it.
 macro_rules! methods {
@@ -63,6 +63,14 @@ pub(crate) type LimitOf<'a> = &'a (dyn Fn(usize, usize) -> Option<Limit> + Sync)
 pub(crate) trait Detector: Debug + Send + Sync {
     /// Bodies were added, removed or replaced.
     fn bodies_changed(&mut self, _bodies: &[SceneBody]) {}
+
+    /// Whether bodies are searched in the wide layout.
+    fn is_packed(&self) -> bool {
+        false
+    }
+
+    /// A body, packed, that the bodies hold when they have changed.
+    fn take_packed(&mut self, _body: WideBody) {}
 
     /// Whether the bounding trees are needed in every frame; else they are refitted when asked for.
     fn uses_trees(&self) -> bool {

@@ -29,6 +29,7 @@ use crate::upper_tree::UpperTree;
 pub use crate::method::Method;
 use lazy_tree::LazyTree;
 
+pub use change::{ChangedSurface, SurfaceBasis};
 pub use error::SceneError;
 pub use memory::DetectionMemory;
 pub use options::{IntersectionOptions, ProximityOptions, SceneOptions};

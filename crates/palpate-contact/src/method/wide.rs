@@ -224,6 +224,14 @@ impl Detector for Wide {
         }
     }
 
+    fn is_packed(&self) -> bool {
+        true
+    }
+
+    fn take_packed(&mut self, body: WideBody) {
+        self.bodies.push(body);
+    }
+
     fn uses_trees(&self) -> bool {
         false
     }

@@ -2,12 +2,59 @@
 
 use std::sync::Arc;
 
+use palpate_geometry::Point;
 use palpate_model::{Mesh, MeshChange, Structure};
 
+use super::lazy_tree::LazyTree;
 use super::{Scene, SceneBody, SceneError};
+use crate::bounding_tree::BoundingTree;
 use crate::left_out::Groups;
 use crate::surface::Surface;
 use crate::upper_tree::UpperTree;
+use crate::wide::WideBody;
+
+/// What the surface of a body after a change of its mesh is made from: nothing that moves, so that bodies may
+/// move meanwhile.
+#[derive(Clone, Debug)]
+pub struct SurfaceBasis {
+    mesh: Arc<Mesh>,
+    tree: BoundingTree,
+    is_packed: bool,
+}
+
+/// The surface of a body after a change of its mesh, in the form in which it is searched.
+#[derive(Debug)]
+pub struct ChangedSurface {
+    before: Arc<Mesh>,
+    mesh: Arc<Mesh>,
+    tree: BoundingTree,
+    surface: Surface,
+    packed: Option<WideBody>,
+}
+
+impl ChangedSurface {
+    /// Makes what becomes of a body by `change`, its nodes somewhere near `positions` \[m\]: what is close
+    /// to each other there is searched together. What is found does not depend on it.
+    ///
+    /// # Errors
+    /// If `change` is not one of the body's mesh; the text says why.
+    pub fn new(
+        basis: SurfaceBasis,
+        change: &MeshChange,
+        positions: &[Point],
+    ) -> Result<Self, &'static str> {
+        let SurfaceBasis { mesh: before, mut tree, is_packed } = basis;
+        check_change(&before, change)?;
+        if positions.len() != change.nodes.len() {
+            return Err("there is not one position for each of its nodes");
+        }
+        tree.change(change);
+        let mesh = Arc::clone(&change.mesh);
+        let surface = Surface::new(&mesh, tree.triangle_order());
+        let packed = is_packed.then(|| WideBody::pack(&mesh, positions));
+        Ok(Self { before, mesh, tree, surface, packed })
+    }
+}
 
 impl Scene {
     /// Gives a body the mesh that a cut or a removal has made of its own, its nodes where the nodes that
@@ -22,10 +69,47 @@ impl Scene {
     /// # Errors
     /// If there is no such body, or `change` is not one of its mesh; the scene is then unchanged.
     pub fn change_body(&mut self, body: usize, change: &MeshChange) -> Result<(), SceneError> {
+        let basis = self.surface_basis(body)?;
+        let other = |reason| SceneError::OtherMesh { body, reason };
+        check_change(&basis.mesh, change).map_err(other)?;
+        let positions = change.positions(&self.bodies[body].positions);
+        let changed = ChangedSurface::new(basis, change, &positions).map_err(other)?;
+        self.go_on_with(body, changed, change)
+    }
+
+    /// What the surface of a body after a change can be made from; see [`ChangedSurface::new`].
+    ///
+    /// # Errors
+    /// If there is no such body.
+    pub fn surface_basis(&self, body: usize) -> Result<SurfaceBasis, SceneError> {
         self.check_body(body)?;
-        check_change(&self.bodies[body].mesh, change)
-            .map_err(|reason| SceneError::OtherMesh { body, reason })?;
-        self.bodies[body].change(change);
+        let SceneBody { mesh, tree, .. } = &self.bodies[body];
+        let is_packed = self.detector.is_packed();
+        Ok(SurfaceBasis { mesh: Arc::clone(mesh), tree: tree.copy(), is_packed })
+    }
+
+    /// Goes on with a body that was made for `change`, as [`Self::change_body`]: all but the time that packing
+    /// takes.
+    ///
+    /// # Errors
+    /// If there is no such body, or its mesh is not the one before the change, or the change another one; the
+    /// scene is then unchanged.
+    pub fn go_on_with(
+        &mut self,
+        body: usize,
+        changed: ChangedSurface,
+        change: &MeshChange,
+    ) -> Result<(), SceneError> {
+        self.check_body(body)?;
+        let now = &self.bodies[body].mesh;
+        if !Arc::ptr_eq(now, &changed.before) || !Arc::ptr_eq(&change.mesh, &changed.mesh) {
+            return Err(SceneError::OtherMesh { body, reason: "it was made for another one" });
+        }
+        let ChangedSurface { tree, surface, packed, .. } = changed;
+        self.bodies[body].change(change, tree, surface);
+        if let Some(packed) = packed {
+            self.detector.take_packed(packed);
+        }
         self.bodies_changed();
         Ok(())
     }
@@ -63,7 +147,7 @@ impl Scene {
 }
 
 impl SceneBody {
-    fn change(&mut self, change: &MeshChange) {
+    fn change(&mut self, change: &MeshChange, tree: BoundingTree, surface: Surface) {
         self.positions = change.positions(&self.positions);
         let groups = self.groups.as_ref().map(|groups| {
             let of_triangles = groups_after(&self.mesh, groups.of_triangles(), change);
@@ -71,9 +155,8 @@ impl SceneBody {
         });
         self.groups = groups.flatten();
         self.mesh = Arc::clone(&change.mesh);
-        let tree = self.tree.get_mut();
-        tree.change(change);
-        self.surface = Surface::new(&self.mesh, tree.triangle_order());
+        self.tree = LazyTree::waiting(tree);
+        self.surface = surface;
     }
 }
 

@@ -18,6 +18,11 @@ impl LazyTree {
         Self { current: OnceLock::from(tree), waiting: Mutex::new(None) }
     }
 
+    /// A tree that must be refitted.
+    pub(super) fn waiting(tree: BoundingTree) -> Self {
+        Self { current: OnceLock::new(), waiting: Mutex::new(Some(tree)) }
+    }
+
     /// The tree at `positions`, the same since the last call of `set_moved`.
     #[inline]
     pub(super) fn get(&self, positions: &[Point]) -> &BoundingTree {
@@ -29,11 +34,11 @@ impl LazyTree {
         })
     }
 
-    /// The tree, whatever positions it is at; afterwards it must be refitted.
-    pub(super) fn get_mut(&mut self) -> &mut BoundingTree {
-        self.set_moved();
-        let waiting = self.waiting.get_mut().unwrap_or_else(PoisonError::into_inner);
-        waiting.as_mut().expect("a tree that is not current waits")
+    /// A copy of the tree, whatever positions it is at.
+    pub(super) fn copy(&self) -> BoundingTree {
+        let waiting = || self.waiting.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let tree = self.current.get().cloned().or_else(waiting);
+        tree.expect("a tree that is not current waits")
     }
 
     pub(super) fn set_moved(&mut self) {

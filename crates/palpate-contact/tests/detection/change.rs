@@ -2,7 +2,9 @@
 
 use std::sync::Arc;
 
-use palpate_contact::{IntersectionOptions, Method, Scene, SceneError, SceneOptions};
+use palpate_contact::{
+    ChangedSurface, IntersectionOptions, Method, Scene, SceneError, SceneOptions,
+};
 use palpate_cutting::{Blade, CutOptions, cut};
 use palpate_model::{Mesh, MeshChange};
 
@@ -12,6 +14,9 @@ use crate::scenes::{Point, Positions, Random, as_slices, block, horseshoe, jitte
 const COMPLETE: IntersectionOptions =
     IntersectionOptions { self_contact: true, same_leaf: true, shared_nodes: false };
 
+/// Leaf size of the scenes in which changes are prepared.
+const PREPARED: usize = 4;
+
 /// Scenes of one and the same bodies, the last one by the double loop.
 struct Twins(Vec<Scene>);
 
@@ -20,13 +25,22 @@ impl Twins {
         let of = |(method, leaf_size)| {
             scene(meshes, SceneOptions { method, leaf_size, ..SceneOptions::default() })
         };
-        let kinds = [(Method::Wide, 2), (Method::Paper, 1), (Method::Paper, 4)];
-        Self(kinds.into_iter().chain([(Method::AllPairs, 2)]).map(of).collect())
+        let kinds = [(Method::Wide, 2), (Method::Wide, PREPARED), (Method::Paper, 1)];
+        let kinds = kinds.into_iter().chain([(Method::Paper, PREPARED), (Method::Hash, 3)]);
+        Self(kinds.chain([(Method::AllPairs, 2)]).map(of).collect())
     }
 
     fn change(&mut self, body: usize, change: &MeshChange) {
         for scene in &mut self.0 {
-            scene.change_body(body, change).expect("a change of its mesh");
+            if scene.options().leaf_size == PREPARED {
+                let basis = scene.surface_basis(body).expect("there is such a body");
+                // Elsewhere than the body is by now.
+                let rest = change.mesh.nodes();
+                let made = ChangedSurface::new(basis, change, rest).expect("a change of its mesh");
+                scene.go_on_with(body, made, change).expect("its mesh");
+            } else {
+                scene.change_body(body, change).expect("a change of its mesh");
+            }
         }
     }
 
@@ -38,7 +52,7 @@ impl Twins {
 
     /// Compares all results; returns how many pairs met, were close, and how many nodes were inside.
     fn compare(&mut self, distance: f64, name: &str) -> [usize; 3] {
-        let (slow, fast) = self.0.split_last_mut().expect("four scenes");
+        let (slow, fast) = self.0.split_last_mut().expect("some scenes");
         let shared = IntersectionOptions { shared_nodes: true, ..COMPLETE };
         let expected = slow.intersections(&shared).pairs.clone();
         let apart = slow.intersections(&COMPLETE).pairs.clone();
@@ -247,6 +261,21 @@ fn a_change_of_another_mesh_is_refused() {
         scene.change_body(2, &change),
         Err(SceneError::BodyOutOfRange { body: 2, count: 2 })
     );
+    let basis = scene.surface_basis(1).expect("two bodies");
+    assert!(ChangedSurface::new(basis, &change, change.mesh.nodes()).is_err());
+    let basis = || scene.surface_basis(0).expect("two bodies");
+    assert!(ChangedSurface::new(basis(), &change, &[]).is_err(), "no positions");
+    let made = || ChangedSurface::new(basis(), &change, change.mesh.nodes()).expect("its mesh");
+    let [first, second, third] = [made(), made(), made()];
+    assert!(matches!(
+        scene.go_on_with(1, first, &change),
+        Err(SceneError::OtherMesh { body: 1, .. })
+    ));
+    let other = meshes[0].remove(&[4]).expect("most are left");
+    assert!(scene.go_on_with(0, second, &other).is_err(), "made for another change");
     assert_eq!(scene.positions(1).len(), positions(&meshes)[1].len());
+    assert_eq!(scene.positions(0).len(), positions(&meshes)[0].len());
+    validate(&scene);
+    scene.go_on_with(0, third, &change).expect("its mesh");
     validate(&scene);
 }

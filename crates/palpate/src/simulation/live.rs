@@ -5,12 +5,14 @@
 //! its own makes it while steps go on. When it opens is decided by the step, never by how fast the thread
 //! was: a step that comes too early waits.
 
+use std::borrow::Cow;
 use std::sync::Arc;
 use std::thread::{self, JoinHandle};
 use std::time::Instant;
 
+use palpate_contact::{ChangedSurface, SceneError, SurfaceBasis};
 use palpate_cutting::{Blade, CutOptions};
-use palpate_geometry::Point;
+use palpate_geometry::{Aabb, Point};
 use palpate_mechanics::{BodyBasis, ChangedBody};
 use palpate_model::{MeshChange, Model};
 use serde::{Deserialize, Serialize};
@@ -32,7 +34,7 @@ struct LiveStroke {
     blade: Blade,
     options: CutOptions,
     delay: u32,
-    /// Of each body; none of rigid ones.
+    /// Of each body; none of rigid ones, nor of those that the blade passes by.
     positions: Vec<Vec<Point>>,
 }
 
@@ -40,7 +42,8 @@ struct LiveStroke {
 #[derive(Clone, Debug, Deserialize, Serialize)]
 struct Begun {
     strokes: Vec<Arc<LiveStroke>>,
-    /// For each body the shape that its matrix is made of: steps may take another meanwhile.
+    /// For each body that a stroke reaches the shape that its next matrix is made of: steps may take another
+    /// meanwhile.
     shapes: Vec<Vec<Point>>,
     /// They open before the step after so many.
     due: u64,
@@ -60,9 +63,16 @@ struct Preparation {
     time_step: f64,
     strokes: Vec<Arc<LiveStroke>>,
     pending: PendingFaces,
-    /// Of each body the shortest edge of its parts [m] where a stroke does not say, and what its matrix is made from.
-    min_edges: Vec<f64>,
-    bases: Vec<BodyBasis>,
+    /// Of each body.
+    bases: Vec<Basis>,
+}
+
+/// What a body after the cut is made from.
+struct Basis {
+    /// Shortest edge [m] of the parts where a stroke does not say.
+    min_edge: f64,
+    /// For mechanics and detection; `None` where no stroke reaches the body.
+    made_from: Option<(BodyBasis, SurfaceBasis)>,
 }
 
 /// A cut that is ready to open.
@@ -75,6 +85,7 @@ struct Opening {
 struct OpenedBody {
     change: BodyChange,
     made: ChangedBody,
+    surface: ChangedSurface,
     /// After this change and those before it.
     model: Arc<Model>,
 }
@@ -99,10 +110,13 @@ impl Simulation {
         delay: u32,
     ) -> Result<(), SimulationError> {
         options.check().map_err(|source| SimulationError::Cut { body: 0, source })?;
+        let bounds = blade.bounds();
         let bodies = self.model.bodies.iter().enumerate();
-        let positions = bodies.map(|(body, description)| match description.rigid {
-            Some(_) => Vec::new(),
-            None => self.positions(body).to_vec(),
+        let positions = bodies.map(|(body, description)| {
+            let positions = self.positions(body);
+            let reached =
+                description.rigid.is_none() && Aabb::from_points(positions).intersects(&bounds);
+            if reached { positions.to_vec() } else { Vec::new() }
         });
         let stroke = LiveStroke {
             blade: blade.clone(),
@@ -126,7 +140,8 @@ impl Simulation {
             let strokes = std::mem::take(&mut self.live.waiting);
             let delay = strokes.iter().map(|stroke| stroke.delay).max().unwrap_or(0);
             let due = self.dynamics.step_count().saturating_add(u64::from(delay));
-            self.live.begun = Some(Begun { strokes, shapes: self.shapes(), due });
+            let shapes = self.shapes(&strokes);
+            self.live.begun = Some(Begun { strokes, shapes, due });
             if delay > 0 {
                 self.start_work();
             }
@@ -157,7 +172,7 @@ impl Simulation {
     /// Begins what is on its way anew, on the bodies that there are now.
     pub(super) fn begin_live_cuts_anew(&mut self) {
         if let Some(mut begun) = self.live.begun.take() {
-            begun.shapes = self.shapes();
+            begun.shapes = self.shapes(&begun.strokes);
             self.live.begun = Some(begun);
             self.start_work();
         }
@@ -169,8 +184,12 @@ impl Simulation {
         std::mem::forget(self.live_work.thread.take());
     }
 
-    fn shapes(&self) -> Vec<Vec<Point>> {
-        (0..self.model.bodies.len()).map(|body| self.dynamics.next_stiff_shape(body)).collect()
+    fn shapes(&self, strokes: &[Arc<LiveStroke>]) -> Vec<Vec<Point>> {
+        let shape = |body| {
+            let reached = strokes.iter().any(|stroke| stroke.reaches(body));
+            if reached { self.dynamics.next_stiff_shape(body) } else { Vec::new() }
+        };
+        (0..self.model.bodies.len()).map(shape).collect()
     }
 
     /// Starts a thread for what has begun; where the system gives none, the work is done when it is due.
@@ -187,14 +206,17 @@ impl Simulation {
         pending.resize(bodies, Vec::new());
         let options = CutOptions::default();
         let basis = |(body, shape): (usize, &Vec<Point>)| {
-            self.dynamics.basis(body).with_shape(shape.clone())
+            let made_from = begun.reaches(body).then(|| {
+                let surface = self.scene.surface_basis(body).expect("a body of the model");
+                (self.dynamics.basis(body).with_shape(shape.clone()), surface)
+            });
+            Basis { min_edge: self.min_edge(body, &options), made_from }
         };
         Some(Preparation {
             model: Arc::clone(&self.model),
             time_step: self.options.time_step,
             strokes: begun.strokes.clone(),
             pending,
-            min_edges: (0..bodies).map(|body| self.min_edge(body, &options)).collect(),
             bases: (0..).zip(&begun.shapes).map(basis).collect(),
         })
     }
@@ -215,12 +237,12 @@ impl Simulation {
     fn open(&mut self, opening: Opening) -> Result<(), SimulationError> {
         let Opening { bodies, pending, mut times } = opening;
         let mut report = ChangeReport::default();
-        for OpenedBody { mut change, made, model } in bodies {
+        for OpenedBody { mut change, made, surface, model } in bodies {
             let begin = Instant::now();
             change.released = self.dynamics.go_on_with(made, &model, &change.change);
             times.mechanics += begin.elapsed();
             let begin = Instant::now();
-            self.scene.change_body(change.body, &change.change)?;
+            self.scene.go_on_with(change.body, surface, &change.change)?;
             times.detection += begin.elapsed();
             self.live.follow(&with_change(model.bodies.len(), &change));
             self.set_model(model);
@@ -235,6 +257,12 @@ impl Simulation {
         }
         self.live_work.opened = Some(report);
         Ok(())
+    }
+}
+
+impl Begun {
+    fn reaches(&self, body: usize) -> bool {
+        self.strokes.iter().any(|stroke| stroke.reaches(body))
     }
 }
 
@@ -261,63 +289,74 @@ impl LiveCuts {
 
     /// Whether it is of the bodies of a model.
     fn fits(&self, model: &Model) -> bool {
-        let counts = |positions: &Vec<Vec<Point>>, may_be_empty: bool| {
+        let counts = |positions: &Vec<Vec<Point>>| {
             positions.len() == model.bodies.len()
                 && positions.iter().zip(&model.bodies).all(|(positions, body)| {
-                    let expected = body.mesh.nodes().len();
-                    positions.len() == expected
-                        || positions.is_empty() && (may_be_empty || body.rigid.is_some())
+                    positions.is_empty()
+                        || body.rigid.is_none() && positions.len() == body.mesh.nodes().len()
                 })
         };
         let begun = self.begun.iter().flat_map(|begun| &begun.strokes);
-        self.waiting.iter().chain(begun).all(|stroke| counts(&stroke.positions, false))
-            && self.begun.iter().all(|begun| counts(&begun.shapes, true))
+        self.waiting.iter().chain(begun).all(|stroke| counts(&stroke.positions))
+            && self.begun.iter().all(|begun| counts(&begun.shapes))
     }
 }
 
 impl Preparation {
     /// Cuts with one stroke after the other, and makes what the bodies become.
     fn run(self) -> Result<Opening, SimulationError> {
-        let Self { model, time_step, strokes, mut pending, min_edges, bases } = self;
+        let Self { model, time_step, strokes, mut pending, mut bases } = self;
         let start = Instant::now();
         let mut changes: Vec<Option<BodyChange>> = model.bodies.iter().map(|_| None).collect();
         for stroke in &strokes {
-            stroke.cut(&model, &mut changes, &mut pending, &min_edges)?;
+            stroke.cut(&model, &mut changes, &mut pending, &bases)?;
         }
         let mut times = ChangeTimes { cutting: start.elapsed(), ..ChangeTimes::default() };
-        let begin = Instant::now();
         let mut bodies = Vec::new();
         let mut model = model;
         for change in changes.into_iter().flatten() {
             let body = change.body;
             model = Arc::new(model.changed(body, &change.change));
-            let basis = &bases[body];
-            let made = ChangedBody::new(&model, body, &change.change, basis, time_step)?
-                .prepared(basis, &change.change);
-            bodies.push(OpenedBody { change, made, model: Arc::clone(&model) });
+            let made_from = bases[body].made_from.take();
+            let (basis, surface) = made_from.expect("what is cut is reached");
+            let begin = Instant::now();
+            let made = ChangedBody::new(&model, body, &change.change, &basis, time_step)?
+                .prepared(&basis, &change.change);
+            times.mechanics += begin.elapsed();
+            let begin = Instant::now();
+            let last = strokes.iter().rfind(|stroke| stroke.reaches(body)).expect("reached");
+            let near = change.change.positions(&last.positions[body]);
+            let surface = ChangedSurface::new(surface, &change.change, &near)
+                .map_err(|reason| SceneError::OtherMesh { body, reason })?;
+            times.detection += begin.elapsed();
+            bodies.push(OpenedBody { change, made, surface, model: Arc::clone(&model) });
         }
-        times.mechanics = begin.elapsed();
         Ok(Opening { bodies, pending, times })
     }
 }
 
 impl LiveStroke {
+    /// Whether the blade may cut a body.
+    fn reaches(&self, body: usize) -> bool {
+        !self.positions[body].is_empty()
+    }
+
     /// Cuts what the bodies of `model` have become by `changes`, and adds to these.
     fn cut(
         &self,
         model: &Model,
         changes: &mut [Option<BodyChange>],
         pending: &mut PendingFaces,
-        min_edges: &[f64],
+        bases: &[Basis],
     ) -> Result<(), SimulationError> {
-        let deformable = (0..changes.len()).filter(|&body| model.bodies[body].rigid.is_none());
-        let positions: Vec<Vec<Point>> = (self.positions.iter().zip(&*changes))
+        let reached = (0..changes.len()).filter(|&body| self.reaches(body));
+        let positions: Vec<Cow<[Point]>> = (self.positions.iter().zip(&*changes))
             .map(|(positions, change)| match change {
-                Some(change) => change.change.positions(positions),
-                None => positions.clone(),
+                Some(change) if !positions.is_empty() => change.change.positions(positions).into(),
+                _ => positions.into(),
             })
             .collect();
-        let bodies = deformable.map(|body| BodyToCut {
+        let bodies = reached.map(|body| BodyToCut {
             body,
             mesh: match &changes[body] {
                 Some(change) => &change.change.mesh,
@@ -325,7 +364,7 @@ impl LiveStroke {
             },
             positions: &positions[body],
             pending: &pending[body],
-            min_edge: self.options.min_edge.unwrap_or(min_edges[body]),
+            min_edge: self.options.min_edge.unwrap_or(bases[body].min_edge),
         });
         let cuts = cut_bodies(bodies, &self.blade, &self.options)
             .map_err(|(body, source)| SimulationError::Cut { body, source })?;
