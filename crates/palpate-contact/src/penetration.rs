@@ -59,7 +59,7 @@ impl PenetrationSearch {
         let visited = frame.upper.pairs(pairs);
         let closed = |body: u32| frame.bodies[body as usize].surface.closed;
         let wanted = |a: u32, b: u32| {
-            !frame.is_ignored(a, b) && closed(b) && include(a as usize, b as usize)
+            !frame.left_out.has_bodies(a, b) && closed(b) && include(a as usize, b as usize)
         };
         pairs.retain(|&(a, b)| wanted(a, b) || wanted(b, a));
         let between = pairs.len();

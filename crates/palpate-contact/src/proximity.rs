@@ -2,9 +2,9 @@
 
 use palpate_geometry::{Point, edge_edge, point_triangle, vec3};
 
-use crate::left_out::CommonGroups;
+use crate::left_out::Elements;
 use crate::pairs::{PairKind, ProximityPair};
-use crate::scene::{ProximityOptions, SceneBody};
+use crate::scene::{Frame, ProximityOptions, SceneBody};
 
 /// Distances below this fraction of the elements' size are too small to give a direction.
 const DIRECTION_THRESHOLD: f64 = 1e-12;
@@ -20,12 +20,12 @@ pub(crate) struct Limit {
 /// Node `node` of body `body_a` against triangle `triangle` of body `body_b`; `None` when they share
 /// the node or are otherwise not wanted.
 pub(crate) fn vertex_triangle(
-    bodies: &[SceneBody],
+    frame: &Frame,
     [body_a, body_b]: [u32; 2],
     [node, triangle]: [u32; 2],
     limit: Limit,
 ) -> Option<ProximityPair> {
-    let (a, b) = (&bodies[body_a as usize], &bodies[body_b as usize]);
+    let [a, b] = [body_a, body_b].map(|body| &frame.bodies[body as usize]);
     let corners = b.mesh.triangles()[triangle as usize];
     if body_a == body_b && corners.contains(&node) {
         return None;
@@ -40,8 +40,7 @@ pub(crate) fn vertex_triangle(
     if limit.options.each_feature_once && !is_first(b, triangle, found.weights) {
         return None;
     }
-    let common = |groups: CommonGroups| groups.of_node_and_triangle([node, triangle]);
-    if CommonGroups::of(a, b).is_some_and(common) {
+    if frame.leaves_out([body_a, body_b], Elements::NodeAndTriangle([node, triangle])) {
         return None;
     }
     if !limit.options.close_at_rest {
@@ -88,12 +87,12 @@ fn is_first(body: &SceneBody, triangle: u32, weights: [f64; 3]) -> bool {
 
 /// Two surface edges; `None` when they share a node or are otherwise not wanted.
 pub(crate) fn edge_pair(
-    bodies: &[SceneBody],
+    frame: &Frame,
     [body_a, body_b]: [u32; 2],
     [edge_a, edge_b]: [u32; 2],
     limit: Limit,
 ) -> Option<ProximityPair> {
-    let (a, b) = (&bodies[body_a as usize], &bodies[body_b as usize]);
+    let [a, b] = [body_a, body_b].map(|body| &frame.bodies[body as usize]);
     let nodes_a = a.mesh.surface_edges()[edge_a as usize];
     let nodes_b = b.mesh.surface_edges()[edge_b as usize];
     if body_a == body_b && nodes_a.iter().any(|node| nodes_b.contains(node)) {
@@ -108,8 +107,7 @@ pub(crate) fn edge_pair(
     if gap >= limit.distance || (limit.options.each_feature_once && weights.contains(&0.0)) {
         return None;
     }
-    let common = |groups: CommonGroups| groups.of_edges([edge_a, edge_b]);
-    if CommonGroups::of(a, b).is_some_and(common) {
+    if frame.leaves_out([body_a, body_b], Elements::Edges([edge_a, edge_b])) {
         return None;
     }
     if !limit.options.close_at_rest {

@@ -17,7 +17,7 @@ use rayon::ThreadPool;
 use rayon::prelude::*;
 
 use crate::bounding_tree::{BoundingTree, corner_points};
-use crate::left_out::{CommonGroups, Groups, IgnoredPairs};
+use crate::left_out::{Elements, LeftOut};
 use crate::method::Detector;
 use crate::penetration::PenetrationSearch;
 use crate::points::SurfacePoint;
@@ -44,8 +44,6 @@ pub(crate) struct SceneBody {
     pub(crate) positions: Vec<Point>,
     tree: LazyTree,
     pub(crate) surface: Surface,
-    /// `None` where no triangle has a group.
-    pub(crate) groups: Option<Groups>,
 }
 
 impl SceneBody {
@@ -53,7 +51,7 @@ impl SceneBody {
         let tree = BoundingTree::new(&mesh, options.leaf_size, options.split);
         let surface = Surface::new(&mesh, tree.triangle_order());
         let positions = mesh.nodes().to_vec();
-        Self { mesh, positions, tree: LazyTree::new(tree), surface, groups: None }
+        Self { mesh, positions, tree: LazyTree::new(tree), surface }
     }
 
     /// The bounding tree, refitted to the positions.
@@ -72,26 +70,22 @@ impl SceneBody {
 pub(crate) struct Frame<'a> {
     pub(crate) bodies: &'a [SceneBody],
     pub(crate) upper: &'a UpperTree,
-    pub(crate) ignored: &'a IgnoredPairs,
-    /// Whether triangles of a common group are no pair.
-    pub(crate) with_groups: bool,
+    pub(crate) left_out: &'a LeftOut,
+    /// Whether only bodies are left out, no elements of theirs.
+    pub(crate) all_elements: bool,
     pub(crate) pool: Option<&'a ThreadPool>,
 }
 
 impl Frame<'_> {
-    /// Whether a body pair, in any order, is not to be tested.
-    pub(crate) fn is_ignored(&self, a: u32, b: u32) -> bool {
-        self.ignored.holds(a, b)
+    /// Whether elements of two bodies may be left out.
+    pub(crate) fn may_leave_out(&self, bodies: [u32; 2]) -> bool {
+        !self.all_elements && self.left_out.concerns(bodies)
     }
 
-    /// The groups of two bodies; `None` where none matter.
+    /// Whether two elements are no pair.
     #[inline]
-    pub(crate) fn common_groups<'a>(
-        &self,
-        a: &'a SceneBody,
-        b: &'a SceneBody,
-    ) -> Option<CommonGroups<'a>> {
-        if self.with_groups { CommonGroups::of(a, b) } else { None }
+    pub(crate) fn leaves_out(&self, bodies: [u32; 2], elements: Elements) -> bool {
+        !self.all_elements && self.left_out.has(bodies, elements)
     }
 
     /// Collects the body pairs (a <= b) whose triangles can meet; returns the upper tree's nodes visited.
@@ -101,7 +95,7 @@ impl Frame<'_> {
         if self_contact {
             found.extend((0..self.bodies.len() as u32).map(|body| (body, body)));
         }
-        found.retain(|&(a, b)| !self.is_ignored(a, b));
+        found.retain(|&(a, b)| !self.left_out.has_bodies(a, b));
         visited
     }
 
@@ -115,11 +109,10 @@ impl Frame<'_> {
             pairs += before * count + of_one(count);
             before += count;
         }
-        let ignored = self.ignored.pairs().iter();
-        let left_out = |&[a, b]: &[u32; 2]| {
-            if a == b { of_one(count(a)) } else { count(a) * count(b) }
-        };
-        pairs - ignored.map(left_out).sum::<u64>()
+        self.left_out.for_each_pair(|a, b| {
+            pairs -= if a == b { of_one(count(a)) } else { count(a) * count(b) };
+        });
+        pairs
     }
 }
 
@@ -131,7 +124,7 @@ impl Frame<'_> {
 pub struct Scene {
     bodies: Vec<SceneBody>,
     upper: UpperTree,
-    ignored: IgnoredPairs,
+    pub(crate) left_out: LeftOut,
     options: SceneOptions,
     threads: Threads,
     detector: Box<dyn Detector>,
@@ -175,7 +168,7 @@ impl Scene {
         let mut scene = Self {
             bodies,
             upper,
-            ignored: IgnoredPairs::default(),
+            left_out: LeftOut::default(),
             options,
             threads,
             detector: options.method.detector(),
@@ -208,7 +201,7 @@ impl Scene {
         self.check_body(body)?;
         let removed = self.bodies.remove(body);
         self.upper.remove(body);
-        self.ignored.remove_body(body as u32);
+        self.left_out.remove(body as u32);
         self.bodies_changed();
         Ok(removed.mesh)
     }
@@ -222,42 +215,9 @@ impl Scene {
         self.check_body(body)?;
         let new = SceneBody::new(mesh, &self.options);
         let former = std::mem::replace(&mut self.bodies[body], new);
+        self.left_out.replace(body as u32);
         self.bodies_changed();
         Ok(former.mesh)
-    }
-
-    /// Leaves two bodies, in any order, out of every search, or takes them in again; the same body twice
-    /// is its self-contact.
-    ///
-    /// # Errors
-    /// If there is no such body.
-    pub fn ignore(&mut self, a: usize, b: usize, ignored: bool) -> Result<(), SceneError> {
-        self.check_body(a)?;
-        self.check_body(b)?;
-        self.ignored.set(a as u32, b as u32, ignored);
-        Ok(())
-    }
-
-    /// Whether two bodies, in any order, are left out.
-    pub fn is_ignored(&self, a: usize, b: usize) -> bool {
-        self.ignored.holds(a as u32, b as u32)
-    }
-
-    /// Puts the surface triangles of a body into groups, 0 being none: elements of a common group,
-    /// whatever their bodies, are no pair in [`Self::intersections`], [`Self::contact_nodes`] and
-    /// [`Self::proximity`]. A node or edge is in the groups of all triangles around it.
-    ///
-    /// # Errors
-    /// If there is no such body, or there is not one group for each of its surface triangles.
-    pub fn set_groups(&mut self, body: usize, groups: &[u32]) -> Result<(), SceneError> {
-        self.check_body(body)?;
-        let of_body = &mut self.bodies[body];
-        let (given, expected) = (groups.len(), of_body.mesh.triangles().len());
-        if given != expected {
-            return Err(SceneError::GroupCount { body, given, expected });
-        }
-        of_body.groups = Groups::new(&of_body.mesh, groups);
-        Ok(())
     }
 
     /// Number of bodies.
@@ -352,8 +312,8 @@ impl Scene {
         let frame = Frame {
             bodies: &self.bodies,
             upper: &self.upper,
-            ignored: &self.ignored,
-            with_groups: true,
+            left_out: &self.left_out,
+            all_elements: false,
             pool: self.threads.pool(),
         };
         self.intersections.pairs.clear();
@@ -390,15 +350,17 @@ impl Scene {
         let frame = Frame {
             bodies: &self.bodies,
             upper: &self.upper,
-            ignored: &self.ignored,
-            with_groups: true,
+            left_out: &self.left_out,
+            all_elements: false,
             pool: self.threads.pool(),
         };
         self.proximity.pairs.clear();
         self.proximity.stats = DetectionStats::default();
         let limit_of = |a: usize, b: usize| {
-            let distance = if frame.is_ignored(a as u32, b as u32) { None } else { distance(a, b) };
-            let distance = distance.filter(|&distance| distance > 0.0)?;
+            if frame.left_out.has_bodies(a as u32, b as u32) {
+                return None;
+            }
+            let distance = distance(a, b).filter(|&distance| distance > 0.0)?;
             Some(Limit { distance, options: *options })
         };
         self.detector.proximity(&frame, &limit_of, &mut self.proximity);
@@ -424,12 +386,12 @@ impl Scene {
     /// cross, where two exits are equally near, and where a component goes under as a whole. A node that
     /// came out on the far side of a thin body is outside.
     pub fn penetration(&mut self, include: &(dyn Fn(usize, usize) -> bool + Sync)) -> &Penetration {
-        // A node inside is inside, whatever the groups.
+        // A node inside is inside, whatever its pairs.
         let frame = Frame {
             bodies: &self.bodies,
             upper: &self.upper,
-            ignored: &self.ignored,
-            with_groups: false,
+            left_out: &self.left_out,
+            all_elements: true,
             pool: self.threads.pool(),
         };
         self.penetration.nodes.clear();
@@ -458,7 +420,7 @@ impl Scene {
         bodies.iter().map(|body| body.tree().nodes().len() as u64).sum()
     }
 
-    fn check_body(&self, body: usize) -> Result<(), SceneError> {
+    pub(crate) fn check_body(&self, body: usize) -> Result<(), SceneError> {
         let count = self.bodies.len();
         if body < count { Ok(()) } else { Err(SceneError::BodyOutOfRange { body, count }) }
     }

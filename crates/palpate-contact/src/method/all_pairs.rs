@@ -6,6 +6,7 @@ use palpate_geometry::triangles_intersect;
 
 use super::{Detector, LimitOf};
 use crate::leaf_pairs::share_a_node;
+use crate::left_out::Elements;
 use crate::neighbours::neighbours_meet;
 use crate::pairs::TrianglePair;
 use crate::proximity::{edge_pair, sort, vertex_triangle};
@@ -28,10 +29,10 @@ impl Detector for AllPairs {
             for (body_b, b) in frame.bodies.iter().enumerate().skip(body_a) {
                 let same = body_a == body_b;
                 let wanted = options.self_contact || !same;
-                if !wanted || frame.is_ignored(body_a as u32, body_b as u32) {
+                let bodies = [body_a as u32, body_b as u32];
+                if !wanted || frame.left_out.has_bodies(bodies[0], bodies[1]) {
                     continue;
                 }
-                let groups = frame.common_groups(a, b);
                 found.stats.object_pairs += 1;
                 for (triangle_a, &corners_a) in a.mesh.triangles().iter().enumerate() {
                     let points_a = a.triangle(triangle_a as u32);
@@ -42,7 +43,7 @@ impl Detector for AllPairs {
                         let triangles = [triangle_a as u32, triangle_b as u32];
                         let neighbours = same && share_a_node(corners_a, corners_b);
                         if neighbours && !options.shared_nodes
-                            || groups.is_some_and(|groups| groups.of_triangles(triangles))
+                            || frame.leaves_out(bodies, Elements::Triangles(triangles))
                         {
                             continue;
                         }
@@ -82,7 +83,7 @@ impl Detector for AllPairs {
                     for &node in bodies[from].mesh.surface_nodes() {
                         for triangle in 0..bodies[to].mesh.triangles().len() as u32 {
                             let pair = [from as u32, to as u32];
-                            let record = vertex_triangle(bodies, pair, [node, triangle], limit);
+                            let record = vertex_triangle(frame, pair, [node, triangle], limit);
                             found.pairs.extend(record);
                             found.stats.polygon_tests += 1;
                         }
@@ -96,7 +97,7 @@ impl Detector for AllPairs {
                     let first = if body_a == body_b { edge_a + 1 } else { 0 };
                     for edge_b in first..b.mesh.surface_edges().len() as u32 {
                         let pair = [body_a as u32, body_b as u32];
-                        found.pairs.extend(edge_pair(bodies, pair, [edge_a, edge_b], limit));
+                        found.pairs.extend(edge_pair(frame, pair, [edge_a, edge_b], limit));
                         found.stats.polygon_tests += 1;
                     }
                 }

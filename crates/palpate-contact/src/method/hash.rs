@@ -8,6 +8,7 @@ use palpate_geometry::{Aabb, triangles_intersect, vec3};
 use super::paper::Paper;
 use super::{Detector, LimitOf};
 use crate::leaf_pairs::share_a_node;
+use crate::left_out::Elements;
 use crate::neighbours::neighbours_meet;
 use crate::pairs::TrianglePair;
 use crate::scene::{Frame, IntersectionOptions, Intersections, Proximity, SceneBody};
@@ -235,8 +236,8 @@ fn meeting(
     let neighbours = a.body == b.body && share_a_node(corners_a, corners_b);
     let triangles = [a.index, b.index];
     if neighbours && !shared_nodes
-        || frame.is_ignored(a.body, b.body)
-        || frame.common_groups(body_a, body_b).is_some_and(|groups| groups.of_triangles(triangles))
+        || frame.left_out.has_bodies(a.body, b.body)
+        || frame.leaves_out([a.body, b.body], Elements::Triangles(triangles))
     {
         return None;
     }

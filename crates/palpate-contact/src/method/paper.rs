@@ -7,6 +7,7 @@ use palpate_geometry::{Aabb, triangles_intersect};
 use super::{Detector, LimitOf};
 use crate::bounding_tree::corner_points;
 use crate::leaf_pairs::{BodyPair, Cost, LeafPairSearch, meets, share_a_node, widened};
+use crate::left_out::Elements;
 use crate::neighbours::neighbours_meet;
 use crate::pairs::{ProximityPair, TrianglePair};
 use crate::proximity::{edge_pair, sort, vertex_triangle};
@@ -41,7 +42,7 @@ impl Detector for Paper {
             &mut found.pairs,
             stats,
             |pair, triangles, found, cost| {
-                if !in_common_group(frame, pair, triangles) {
+                if !is_left_out(frame, pair, triangles) {
                     let shared_nodes = options.shared_nodes;
                     found.extend(meeting_triangles(frame, pair, triangles, shared_nodes, cost));
                 }
@@ -73,7 +74,7 @@ impl Detector for Paper {
         }
         stats.object_time = start.elapsed();
         self.close.run(frame, true, &mut found.pairs, stats, |pair, triangles, found, cost| {
-            close_features(frame.bodies, pair, triangles, found, cost);
+            close_features(frame, pair, triangles, found, cost);
         });
         let sorting = Instant::now();
         sort(&mut found.pairs);
@@ -81,14 +82,17 @@ impl Detector for Paper {
     }
 }
 
-/// Whether two triangles, given by their positions in the trees, have a group in common.
+/// Whether two triangles, given by their positions in the trees, are no pair.
 #[inline]
-fn in_common_group(frame: &Frame, pair: &BodyPair, [i, j]: [u32; 2]) -> bool {
-    let (a, b) = (&frame.bodies[pair.a as usize], &frame.bodies[pair.b as usize]);
-    frame.common_groups(a, b).is_some_and(|groups| {
-        let (order_a, order_b) = (a.tree().triangle_order(), b.tree().triangle_order());
-        groups.of_triangles([order_a[i as usize], order_b[j as usize]])
-    })
+fn is_left_out(frame: &Frame, pair: &BodyPair, [i, j]: [u32; 2]) -> bool {
+    let bodies = [pair.a, pair.b];
+    frame.may_leave_out(bodies) && {
+        let triangle = |body: u32, position: u32| {
+            frame.bodies[body as usize].tree().triangle_order()[position as usize]
+        };
+        let triangles = [triangle(pair.a, i), triangle(pair.b, j)];
+        frame.leaves_out(bodies, Elements::Triangles(triangles))
+    }
 }
 
 /// The exact test of two triangles, given by their positions in the trees; of triangles that share
@@ -189,14 +193,14 @@ impl<'a> Side<'a> {
 
 /// The close features of two triangles, of those that each of them owns.
 fn close_features(
-    bodies: &[SceneBody],
+    frame: &Frame,
     pair: &BodyPair,
     [i, j]: [u32; 2],
     found: &mut Vec<ProximityPair>,
     cost: &mut Cost,
 ) {
-    let a = Side::new(bodies, pair.a, i);
-    let b = Side::new(bodies, pair.b, j);
+    let a = Side::new(frame.bodies, pair.a, i);
+    let b = Side::new(frame.bodies, pair.b, j);
     let margin_squared = pair.margin * pair.margin * (1.0 + 1e-9);
     for (from, to) in [(&a, &b), (&b, &a)] {
         for corner in (0..3).filter(|corner| from.owned >> corner & 1 == 1) {
@@ -209,7 +213,7 @@ fn close_features(
             }
             cost.polygon_tests += 1;
             let elements = [node, to.triangle()];
-            found.extend(vertex_triangle(bodies, [from.body, to.body], elements, pair.limit));
+            found.extend(vertex_triangle(frame, [from.body, to.body], elements, pair.limit));
         }
     }
     if a.owned >> 3 == 0 || b.owned >> 3 == 0 {
@@ -234,7 +238,7 @@ fn close_features(
             if pair.is_self() {
                 edges.sort_unstable();
             }
-            found.extend(edge_pair(bodies, [pair.a, pair.b], edges, pair.limit));
+            found.extend(edge_pair(frame, [pair.a, pair.b], edges, pair.limit));
         }
     }
 }

@@ -9,6 +9,7 @@ use rayon::prelude::*;
 
 use super::{Detector, LimitOf};
 use crate::leaf_pairs::{BodyPair, Cost, for_each};
+use crate::left_out;
 use crate::neighbours::neighbours_meet;
 use crate::pairs::{ProximityPair, TrianglePair};
 use crate::proximity::{edge_pair, sort, vertex_triangle};
@@ -451,9 +452,13 @@ impl Search<'_> {
             let triangles = |&[slot_a, slot_b]: &[u32; 2]| {
                 [a.triangles.element(slot_a), b.triangles.element(slot_b)]
             };
-            if let Some(groups) = self.frame.common_groups(body_a, body_b) {
-                crossing.retain(|slots| !groups.of_triangles(triangles(slots)));
-                open.retain(|slots| !groups.of_triangles(triangles(slots)));
+            let bodies = [pair.a, pair.b];
+            if self.frame.may_leave_out(bodies) {
+                let is_kept = |slots: &[u32; 2]| {
+                    !self.frame.leaves_out(bodies, left_out::Elements::Triangles(triangles(slots)))
+                };
+                crossing.retain(is_kept);
+                open.retain(is_kept);
             }
             cost.polygon_tests += (crossing.len() + open.len()) as u64;
             let meet = |slots: &&[u32; 2]| {
@@ -477,7 +482,6 @@ impl Search<'_> {
     fn close(&self, worker: &mut Worker<ProximityPair>) {
         let Worker { candidates, groups, kept, found, cost, .. } = worker;
         found.clear();
-        let scene = self.frame.bodies;
         let mut start = 0;
         for group in groups.iter() {
             let search = &self.searches[group.task.search as usize];
@@ -494,13 +498,13 @@ impl Search<'_> {
                     let (edge_a, edge_b) = (a.edges.element(slot_a), b.edges.element(slot_b));
                     let swapped = pair.is_self() && edge_b < edge_a;
                     let edges = if swapped { [edge_b, edge_a] } else { [edge_a, edge_b] };
-                    found.extend(edge_pair(scene, bodies, edges, pair.limit));
+                    found.extend(edge_pair(self.frame, bodies, edges, pair.limit));
                 }
             } else {
                 self.isa.run(VertexPairs { from: a, to: b, reach, candidates, kept });
                 for &[point, slot] in kept.iter() {
                     let elements = [a.mesh_node(point), b.triangles.element(slot)];
-                    found.extend(vertex_triangle(scene, bodies, elements, pair.limit));
+                    found.extend(vertex_triangle(self.frame, bodies, elements, pair.limit));
                 }
             }
             cost.polygon_tests += kept.len() as u64;

@@ -8,7 +8,6 @@ use palpate_model::{Mesh, MeshChange, Structure};
 use super::lazy_tree::LazyTree;
 use super::{Scene, SceneBody, SceneError};
 use crate::bounding_tree::BoundingTree;
-use crate::left_out::Groups;
 use crate::surface::Surface;
 use crate::upper_tree::UpperTree;
 use crate::wide::WideBody;
@@ -106,6 +105,7 @@ impl Scene {
             return Err(SceneError::OtherMesh { body, reason: "it was made for another one" });
         }
         let ChangedSurface { tree, surface, packed, .. } = changed;
+        self.left_out.change(body as u32, now, change);
         self.bodies[body].change(change, tree, surface);
         if let Some(packed) = packed {
             self.detector.take_packed(packed);
@@ -133,13 +133,13 @@ impl Scene {
         for (body, mesh) in meshes.iter().enumerate() {
             let same = before.next().filter(|before| Arc::ptr_eq(&before.mesh, mesh));
             if same.is_none() {
-                self.ignored.forget(body as u32);
+                self.left_out.forget(body as u32);
             }
             let new = || SceneBody::new(Arc::clone(mesh), &self.options);
             self.bodies.push(same.unwrap_or_else(new));
         }
         for gone in 0..before.len() {
-            self.ignored.forget((meshes.len() + gone) as u32);
+            self.left_out.forget((meshes.len() + gone) as u32);
         }
         self.bodies_changed();
         Ok(())
@@ -149,11 +149,6 @@ impl Scene {
 impl SceneBody {
     fn change(&mut self, change: &MeshChange, tree: BoundingTree, surface: Surface) {
         self.positions = change.positions(&self.positions);
-        let groups = self.groups.as_ref().map(|groups| {
-            let of_triangles = groups_after(&self.mesh, groups.of_triangles(), change);
-            Groups::new(&change.mesh, &of_triangles)
-        });
-        self.groups = groups.flatten();
         self.mesh = Arc::clone(&change.mesh);
         self.tree = LazyTree::waiting(tree);
         self.surface = surface;
@@ -179,24 +174,4 @@ fn check_change(mesh: &Mesh, change: &MeshChange) -> Result<(), &'static str> {
         return Err("a tetrahedron comes from one that the mesh does not have");
     }
     Ok(())
-}
-
-/// The groups of the triangles after a change.
-fn groups_after(old: &Mesh, groups: &[u32], change: &MeshChange) -> Vec<u32> {
-    let (mesh, owners) = (&change.mesh, old.triangle_owners());
-    let comes_from = |nodes: &[u32; 3], triangle: usize| {
-        nodes.iter().all(|&node| {
-            let mut parts = change.nodes[node as usize].parts();
-            parts.all(|(node, _)| old.triangles()[triangle].contains(&node))
-        })
-    };
-    let group = |(nodes, &owner): (&[u32; 3], &u32)| {
-        let parent = change.tetrahedra[owner as usize];
-        // Triangles stand in the order of their owners.
-        let first = owners.partition_point(|&owner| owner < parent);
-        let of_parent = (first..owners.len()).take_while(|&triangle| owners[triangle] == parent);
-        let mut same = of_parent.filter(|&triangle| comes_from(nodes, triangle));
-        same.next().map_or(0, |triangle| groups[triangle])
-    };
-    mesh.triangles().iter().zip(mesh.triangle_owners()).map(group).collect()
 }
