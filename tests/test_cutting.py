@@ -73,7 +73,9 @@ def test_a_live_cut_opens_when_it_should_and_maps_the_users_arrays(simulation, t
     simulation.step(10)
     old = simulation.positions[0]
     mesh = simulation.model.bodies[0].mesh
+    assert not simulation.has_live_cuts
     assert simulation.cut_live(stroke(), delay=3) is None
+    assert simulation.has_live_cuts
     snapshot = simulation.snapshot()
     for _ in range(3):
         report = simulation.step()

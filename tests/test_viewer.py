@@ -545,6 +545,188 @@ def test_a_stroke_cuts_and_undo_mends(viewer):
     assert viewer.header("state")["undo"] == 0
 
 
+@pytest.fixture
+def moving(viewer):
+    """A viewer that plays."""
+    viewer.send({"type": "speed", "value": 1})
+    viewer.send({"type": "play", "on": True})
+    viewer.run(0.4)
+    return viewer
+
+
+def steps(viewer, count):
+    """Let it play so many frames; what was sent meanwhile."""
+    number, known = viewer.header("frame")["number"], len(viewer.sent)
+    for _ in range(1000):
+        if viewer.header("frame")["number"] >= number + count:
+            break
+        viewer.run(0.004)
+    return viewer.sent[known:]
+
+
+def test_while_it_plays_a_stroke_opens_some_steps_later_and_is_told(moving):
+    whole, version = moving.arrays("scene"), moving.header("scene")["version"]
+    moving.send({"type": "cut", "edges": stroke_through(moving, 2)})
+    assert moving.header("state")["undo"] == 1
+    assert moving.header("scene")["version"] == version
+    sent = steps(moving, 4)
+    assert set(sent) == {"frame"}, "the picture goes on"
+    sent = steps(moving, 4)
+    assert sent.count("scene") == sent.count("notice") == 1
+    assert sent.index("scene") < sent.index("notice") < len(sent) - sent[::-1].index("frame")
+    told = moving.header("notice")["text"]
+    assert re.fullmatch(r".*upper: [0-9.]+ cm² cut.* \(in \d+ ms beside the steps\)", told)
+    assert len(moving.arrays("scene")["triangles/2"]) > len(whole["triangles/2"])
+    assert moving.arrays("scene")["cut/2"].any()
+    assert moving.header("frame")["version"] == moving.header("scene")["version"] > version
+    assert moving.header("state")["undo"] == 1
+    steps(moving, 5)
+    moving.send({"type": "undo"})
+    assert moving.header("state")["undo"] == 0
+    for name, array in whole.items():
+        assert np.array_equal(moving.arrays("scene")[name], array)
+    assert "notice" not in steps(moving, 12), "what was undone does not come back"
+
+
+def test_what_takes_longer_to_prepare_opens_later(monkeypatch):
+    simulation = palpate.Simulation("small", time_step=1 / 600)
+    player = LivePlayer(simulation)
+    viewer = NullViewer(player)
+    edges = np.array(stroke_through(viewer, 2))
+    edges[:, 1] = edges.mean(axis=1)  # down to its middle
+    blade = palpate.Blade.stroke(edges)
+    assert player._delay(blade) == 50
+    count = len(simulation.positions[2])
+    monkeypatch.setattr("palpate.viewer.live._DELAY_OF_A_NODE", 1 / 600)
+    assert player._delay(blade) == count, "of the tray, and of what it passes by, none"
+    through = palpate.Blade.stroke([[[-1, 0, -1], [-1, 0, 1]], [[1, 0, -1], [1, 0, 1]]])
+    assert player._delay(through) == sum(len(simulation.positions[body]) for body in range(3))
+    monkeypatch.setattr("palpate.viewer.live._DELAY_OF_A_NODE", 1)
+    assert player._delay(blade) == 1000
+    slow = LivePlayer(palpate.Simulation("small", time_step=0.5))
+    monkeypatch.setattr("palpate.viewer.live._DELAY_OF_A_NODE", 0)
+    assert slow._delay(blade) == 1
+
+
+def test_a_stroke_under_way_that_meets_nothing_is_told(moving):
+    far = (np.array(stroke_through(moving, 2)) + 1).tolist()
+    moving.send({"type": "cut", "edges": far})
+    sent = steps(moving, 8)
+    assert "scene" not in sent
+    assert "no tissue" in moving.header("notice")["text"]
+    assert moving.header("state")["undo"] == 0
+
+
+@pytest.mark.parametrize("end", ["undo", "reset", "settings", "tool"])
+def test_a_stroke_under_way_is_given_up(moving, end):
+    start = moving.arrays("scene")
+    commands = {
+        "settings": {"type": "settings", "body": 0, "material": {"young": 9000}},
+        "tool": {"type": "tool", "tip": [0, 0, 0.3], "direction": [0, 0, -1], "radius": 0.004},
+    }
+    moving.send({"type": "cut", "edges": stroke_through(moving, 2)})
+    steps(moving, 2)
+    moving.send(commands.get(end, {"type": end}))
+    assert moving.header("state")["undo"] == 0
+    known = len(moving.sent)
+    steps(moving, 12)
+    assert "notice" not in moving.sent[known:]
+    if end in commands:
+        assert "given up" in moving.header("notice")["text"]
+    for body in range(4):
+        assert np.array_equal(
+            moving.arrays("scene")[f"triangles/{body}"], start[f"triangles/{body}"]
+        )
+    moving.send({"type": "undo"})
+    assert "no cut" in moving.header("notice")["text"]
+
+
+def test_strokes_that_follow_closely_are_undone_together(moving):
+    whole = moving.arrays("scene")
+    for body in (0, 2):
+        moving.send({"type": "cut", "edges": stroke_through(moving, body)})
+        steps(moving, 2)
+    sent = steps(moving, 14)
+    assert sent.count("notice") == 2
+    assert moving.header("state")["undo"] == 1
+    both = moving.arrays("scene")
+    for name in ("triangles/0", "triangles/2"):
+        assert len(both[name]) > len(whole[name])
+    moving.send({"type": "undo"})
+    for name, array in whole.items():
+        assert np.array_equal(moving.arrays("scene")[name], array)
+    assert "notice" not in steps(moving, 12)
+
+
+def test_a_pause_and_a_separation_before_a_stroke_opens(moving):
+    whole = moving.arrays("scene")
+    moving.send({"type": "cut", "edges": stroke_through(moving, 2)})
+    moving.send({"type": "play", "on": False})
+    moving.send({"type": "cut", "edges": stroke_through(moving, 0)})
+    assert "lower" in moving.header("notice")["text"], "nothing moves: it is cut at once"
+    assert moving.header("state")["undo"] == 1
+    moving.send({"type": "separate"})
+    names = [body["name"] for body in moving.header("scene")["bodies"]]
+    assert "lower/2" in names
+    moving.send({"type": "step", "count": 8})
+    assert "upper" in moving.header("notice")["text"]
+    assert moving.header("state")["undo"] == 1
+    moving.send({"type": "undo"})
+    for name, array in whole.items():
+        assert np.array_equal(moving.arrays("scene")[name], array)
+
+
+def test_cuts_of_the_owner_are_shown_and_not_undone():
+    simulation = palpate.Simulation("small")
+    viewer = NullViewer(simulation)
+    edges = stroke_through(viewer, 2)
+    simulation.cut_live(palpate.Blade.stroke(edges), delay=2)
+    viewer.send({"type": "step", "count": 4})
+    assert "upper" in viewer.header("notice")["text"]
+    assert viewer.arrays("scene")["cut/2"].any()
+    assert viewer.header("state")["undo"] == 0
+
+
+def test_a_stroke_that_cannot_be_cut_is_told_and_steps_go_on():
+    class Broken:
+        """A simulation whose live cut fails when it should open."""
+
+        def __init__(self, simulation):
+            self._inner, self.left = simulation, None
+
+        def __getattr__(self, name):
+            return getattr(self._inner, name)
+
+        def cut_live(self, blade, *, delay):
+            assert len(blade.points) == 8
+            self.left = delay
+
+        @property
+        def has_live_cuts(self):
+            return self.left is not None
+
+        def step(self):
+            if self.left == 0:
+                self.left = None
+                raise palpate.SimulationError("body 2 cannot be cut: the test says so")
+            if self.left is not None:
+                self.left -= 1
+            return self._inner.step()
+
+    player = LivePlayer(palpate.Simulation("small"))
+    viewer = NullViewer(player)
+    player._simulation = Broken(player._simulation)
+    viewer.send({"type": "speed", "value": 1})
+    viewer.send({"type": "play", "on": True})
+    viewer.run(0.2)
+    viewer.send({"type": "cut", "edges": stroke_through(viewer, 2)})
+    steps(viewer, 10)
+    assert "cannot be cut" in viewer.header("notice")["text"]
+    assert viewer.header("state")["playing"] is True
+    assert viewer.header("state")["undo"] == 0
+    assert "problem" not in viewer.sent
+
+
 def test_cuts_stay_when_settings_change_and_go_with_a_reset(viewer):
     whole = viewer.arrays("scene")
     viewer.send({"type": "step", "count": 10})

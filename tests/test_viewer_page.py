@@ -250,6 +250,27 @@ def test_tissue_is_cut_and_mended(page):
     page.wait(f"palpate.state.undo === 0 && palpate.stage.triangleCount === {triangles}")
 
 
+def test_a_stroke_while_it_plays_opens_without_a_stall(page):
+    page.key("4")
+    page.key(" ")
+    page.wait("palpate.state.playing === true")
+    triangles = page.run("palpate.stage.triangleCount")
+    x, y = place_on_screen(page, 2)
+    page.mouse("mousePressed", x - 110, y)
+    for step in range(12):
+        page.mouse("mouseMoved", x - 110 + 20 * step, y + step)
+    page.mouse("mouseReleased", x + 110, y + 11)
+    page.wait(f"palpate.stage.triangleCount > {triangles}")
+    page.wait("/cm² cut.*beside the steps/.test(document.getElementById('toasts').textContent)")
+    assert page.run("palpate.state.playing") is True
+    page.wait("palpate.last.header.version === palpate.version")
+    page.wait("palpate.state.undo === 1")
+    page.key("z")
+    page.wait(f"palpate.state.undo === 0 && palpate.stage.triangleCount === {triangles}")
+    page.key(" ")
+    page.wait("palpate.state.playing === false")
+
+
 def test_two_pages_and_a_lost_server(browser, page, served):
     other = browser.open(served.url)
     other.wait("globalThis.palpate?.received > 0")

@@ -229,8 +229,13 @@ class Simulation:
             reports.append(self._step(1))
         return _together(reports)
 
+    @property
+    def has_live_cuts(self) -> bool:
+        """Whether cuts are on their way that have not opened yet."""
+        return self._core.has_live_cuts
+
     def _step(self, count: int) -> StepReport:
-        changes = self._core.has_live_cuts
+        changes = self.has_live_cuts
         try:
             row = self._core.step(count)
         finally:

@@ -12,14 +12,15 @@ import numpy.typing as npt
 
 from palpate._arrays import Float64Array
 from palpate.contacts import DetectionStats
-from palpate.cutting import Blade
+from palpate.cutting import Blade, BodyCut, CutReport
+from palpate.errors import PalpateError
 from palpate.model import Body, Model
 from palpate.results.cut_faces import CutFaces
 from palpate.results.drawing import looks_of, upward
 from palpate.results.frames import contact_depths
 from palpate.results.measures import node_means
 from palpate.results.stress import Strain, VonMises
-from palpate.simulation import Simulation, Snapshot, StepReport
+from palpate.simulation import MAX_DELAY, Simulation, Snapshot, StepReport
 from palpate.viewer.editing import edited, settings_of, transferred
 from palpate.viewer.hands import Hands
 from palpate.viewer.player import Outcome, Player, Wishes
@@ -31,6 +32,10 @@ _COUNT_INTERVAL = 0.5
 _FIELDS = ("displacement", "deformation", "strain", "stress", "depth", "force")
 #: States before a cut that are kept at most.
 _UNDO = 16
+#: Seconds of simulated time until a stroke opens that is drawn while steps go on: so many at
+#: least, and for each node of the bodies that it may cut.
+_DELAY = 5 / 60
+_DELAY_OF_A_NODE = _DELAY / 2400
 
 
 class LivePlayer(Player):
@@ -53,6 +58,8 @@ class LivePlayer(Player):
         self._stats: DetectionStats | None = None
         self._counted = 0.0
         self._undo: list[Snapshot] = []
+        #: Before the strokes that have not opened yet.
+        self._under_way: Snapshot | None = None
         self._strain: list[Strain] = []
         self._strain_version = -1
         self._von_mises = VonMises(simulation)
@@ -102,22 +109,34 @@ class LivePlayer(Player):
         )
 
     def state(self) -> dict[str, Any]:
-        model = self._simulation.model
+        model, before = self._simulation.model, self._under_way
         return {
             "time_step": self._simulation.time_step,
             "gravity": model.gravity,
             "bodies": [settings_of(body) for body in model.bodies],
-            "undo": len(self._undo),
+            "undo": len(self._undo) + (before is not None and self._is_new(before)),
         }
 
-    def advance(self) -> None:
+    def advance(self) -> Outcome:
         self._hands.move(self._simulation.time_step)
-        self._report = self._simulation.step()
+        try:
+            self._report = self._simulation.step()
+        except PalpateError as error:
+            if self._under_way is None or self._simulation.has_live_cuts or self._is_changed():
+                raise
+            # The stroke could not be cut, and that is all: nothing has changed, steps go on.
+            self._under_way = None
+            self._report = self._simulation.step()
+            return Outcome(state=True, notice=str(error))
+        return self._opened(self._report.cuts) if self._report.cuts else Outcome()
 
     def changed(self) -> bool:
-        if not self._surfaces.fits(self._simulation.positions):
+        if self._is_changed():
             self._new_topology()
         return self._version != self._sent
+
+    def _is_changed(self) -> bool:
+        return not self._surfaces.fits(self._simulation.positions)
 
     def frame(self, number: int, wishes: Wishes, numbers: dict[str, Any]) -> bytes:
         simulation = self._simulation
@@ -178,23 +197,60 @@ class LivePlayer(Player):
         return Outcome(frame=True)
 
     def _cut(self, edges: list[Any]) -> Outcome:
-        before = self._simulation.snapshot()
-        cut = self._simulation.cut(Blade.stroke(edges))
-        if not cut.bodies:
-            return Outcome(notice="the stroke met no tissue")
+        """Beside the steps while there are any, so that the picture goes on; else at once."""
+        before, blade = self._before(), Blade.stroke(edges)
+        if self.is_playing:
+            self._simulation.cut_live(blade, delay=self._delay(blade))
+            self._under_way = before
+            return Outcome(state=True)
+        cut = self._simulation.cut(blade)
+        return self._done(before, cut.bodies, f"in {1e3 * cut.times['total']:.0f} ms")
+
+    def _delay(self, blade: Blade) -> int:
+        """Steps until a stroke opens: in fewer it is not ready, and the picture would wait."""
+        low, high = blade.points.min(axis=0), blade.points.max(axis=0)
+        simulation = self._simulation
+        nodes = sum(
+            len(points)
+            for body, points in zip(simulation.model.bodies, simulation.positions, strict=True)
+            if body.rigid is None
+            and (points.min(axis=0) <= high).all()
+            and (points.max(axis=0) >= low).all()
+        )
+        seconds = max(_DELAY, _DELAY_OF_A_NODE * nodes)
+        return min(max(1, round(seconds / simulation.time_step)), MAX_DELAY)
+
+    def _opened(self, cuts: tuple[CutReport, ...]) -> Outcome:
+        """What the strokes did that opened before the step."""
+        before = self._under_way  # None of those that its owner has begun
+        if not self._simulation.has_live_cuts:
+            self._under_way = None
+        seconds = sum(cut.times["total"] for cut in cuts)
+        how = f"in {1e3 * seconds:.0f} ms beside the steps"
+        return self._done(before, tuple(body for cut in cuts for body in cut.bodies), how)
+
+    def _done(self, before: Snapshot | None, cuts: tuple[BodyCut, ...], how: str) -> Outcome:
+        if not cuts:
+            return Outcome(state=True, notice="the stroke met no tissue")
         self._changed_by_hand(before)
         bodies = self._simulation.model.bodies
         done = [
             f"{bodies[each.body].name}: {each.cut_area * 1e4:.3g} cm² cut"
             + (f", {each.pieces} pieces" if each.pieces > 1 else "")
-            for each in cut.bodies
+            for each in cuts
         ]
-        text = f"{'; '.join(done)} (in {1e3 * cut.times['total']:.0f} ms)"
-        return Outcome(scene=True, frame=True, state=True, notice=text)
+        return Outcome(scene=True, frame=True, state=True, notice=f"{'; '.join(done)} ({how})")
+
+    def _before(self) -> Snapshot:
+        """What undoing a change of now goes back to: what is on its way is undone with it."""
+        return self._under_way or self._simulation.snapshot()
+
+    def _is_new(self, before: Snapshot) -> bool:
+        return before not in self._undo[-1:]
 
     def _separate(self) -> Outcome:
         """Pieces that came apart become bodies."""
-        before, count = self._simulation.snapshot(), len(self._simulation.model.bodies)
+        before, count = self._before(), len(self._simulation.model.bodies)
         self._hands.let_go()
         if not self._simulation.separate():
             return Outcome(notice="nothing has come apart")
@@ -203,16 +259,21 @@ class LivePlayer(Player):
         more = len(self._simulation.model.bodies) - count
         return Outcome(scene=True, frame=True, state=True, notice=f"{more} more bodies")
 
-    def _changed_by_hand(self, before: Snapshot) -> None:
-        self._undo = [*self._undo[1 - _UNDO :], before]
+    def _changed_by_hand(self, before: Snapshot | None) -> None:
+        if before is not None and self._is_new(before):
+            self._undo = [*self._undo[1 - _UNDO :], before]
         self._hands.forget_released()
         self._new_topology()
 
     def _undo_cut(self) -> Outcome:
-        if not self._undo:
-            return Outcome(notice="there is no cut to undo")
+        before = self._under_way
+        if before is None or not self._is_new(before):
+            if not self._undo:
+                return Outcome(notice="there is no cut to undo")
+            before = self._undo.pop()
+        self._under_way = None
         self._hands.let_go()
-        self._simulation.restore(self._undo.pop())
+        self._simulation.restore(before)
         self._hands.attach(self._simulation)
         self._new_topology()
         return Outcome(scene=True, frame=True, state=True)
@@ -221,6 +282,7 @@ class LivePlayer(Player):
         self._hands.let_go()
         self._passed = 0.0
         self._undo.clear()
+        self._under_way = None
         self._report = None
         if self._remade:
             start = self._hands.with_probe(self._start)
@@ -248,9 +310,13 @@ class LivePlayer(Player):
         self._passed += before.time
         self._remade = True
         self._replace(after)
-        dropped = bool(self._undo)
+        given_up, dropped = self._under_way is not None, bool(self._undo)
+        self._under_way = None
         self._undo.clear()
-        return "what was cut before this cannot be undone any more" if dropped else None
+        told = ["the stroke that was on its way was given up"] if given_up else []
+        if dropped:
+            told.append("what was cut before this cannot be undone any more")
+        return "; ".join(told) or None
 
     def _simulation_of(self, model: Model, time_step: float) -> Simulation:
         return Simulation(model, time_step=time_step, **self._simulation._options)

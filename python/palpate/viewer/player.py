@@ -44,6 +44,8 @@ class Player(ABC):
 
     #: ``live`` or ``recording``.
     mode: str
+    #: Whether it moves on by itself now; whoever plays it says so before each command.
+    is_playing = False
 
     @property
     @abstractmethod
@@ -73,8 +75,8 @@ class Player(ABC):
         """What the controls show."""
 
     @abstractmethod
-    def advance(self) -> None:
-        """Move on by one step."""
+    def advance(self) -> Outcome:
+        """Move on by one step; what changed in it beside positions."""
 
     @abstractmethod
     def frame(self, number: int, wishes: Wishes, numbers: dict[str, Any]) -> bytes:

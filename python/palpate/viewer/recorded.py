@@ -83,8 +83,9 @@ class RecordedPlayer(Player):
     def state(self) -> dict[str, Any]:
         return {"undo": 0, "bodies": []}
 
-    def advance(self) -> None:
+    def advance(self) -> Outcome:
         self._show(self._index + 1)
+        return Outcome()
 
     def changed(self) -> bool:
         return self._version != self._sent

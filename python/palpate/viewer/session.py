@@ -170,7 +170,7 @@ class Session:
         player = self._player
         assert player is not None
         try:
-            player.advance()
+            outcome = player.advance()
         except PalpateError as error:
             self._stop_playing()
             self._problem("The simulation cannot go on", error)
@@ -185,8 +185,9 @@ class Session:
             self._due = max(due + player.interval / self._speed, after - _PATIENCE)
         if player.at_end:
             self._stop_playing()
-        if player.changed():
+        if player.changed() and not outcome.scene:
             self._send_scene()
+        self._tell(outcome)
         self._stale = True
         if after - self._shown >= 0.9 / FRAME_RATE or not self._playing:
             self._send_frame(after)
@@ -239,19 +240,23 @@ class Session:
             self._apply(self._player, command, client)
 
     def _apply(self, player: Player, command: Command, client: int) -> None:
+        player.is_playing = self._playing or self._steps_left > 0
         try:
             outcome = player.obey(command, client)
         except (PalpateError, ValueError, IndexError) as error:
             outcome = Outcome(notice=str(error), state=True)
         if outcome.pause:
             self._playing = False
+        self._tell(outcome)
+        self._stale = self._stale or outcome.frame or outcome.scene
+
+    def _tell(self, outcome: Outcome) -> None:
         if outcome.scene:
             self._send_scene()
         if outcome.state or outcome.scene or outcome.pause:
             self._send_state()
         if outcome.notice:
             self._publish("notice", encode("notice", {"text": outcome.notice}))
-        self._stale = self._stale or outcome.frame or outcome.scene
 
     def _send_waiting(self) -> None:
         header = {"protocol": PROTOCOL, "mode": "loading", "title": self._title, "features": []}
