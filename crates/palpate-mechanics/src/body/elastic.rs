@@ -210,10 +210,6 @@ impl ElasticBody {
         self.free_index[node] != FIXED
     }
 
-    fn is_linear(&self) -> bool {
-        matches!(self.elasticity, Elasticity::Linear(_))
-    }
-
     fn is_unattached(&self) -> bool {
         self.free_nodes.len() == self.masses.len()
     }

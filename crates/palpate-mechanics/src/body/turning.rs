@@ -7,6 +7,10 @@
 //! `P = (1 - Q S Q^T M) A^-1 (1 - M Q S Q^T) + k Q S Q^T`, k = dt² / (1 + alpha dt),
 //!
 //! symmetric, positive, and with `Q^T M P = k Q^T`: contact torques change the spin by what they are.
+//!
+//! Forces act where the step begins ([`Levers`]), Q turns the body as it is predicted: where a `Q^T` meets a
+//! force it is that of the levers. The difference is the deformation of a step, but what is squeezed
+//! between a tool and the ground bears forces by which a lever that is wrong by a millimetre turns it by radians.
 
 use glam::{DMat3, DVec3};
 
@@ -21,6 +25,24 @@ pub(super) fn largest_change(
         radius = radius.max(arm.length_squared());
     }
     (change / radius).sqrt()
+}
+
+/// Where forces act on one body: arms about its centre where the step begins, in the frame [m]. With others
+/// two bodies would not change their angular momentum by opposite amounts.
+#[derive(Debug, Default)]
+pub(crate) struct Levers(pub(super) Vec<DVec3>);
+
+impl Levers {
+    pub(crate) fn of(&self, node: u32) -> DVec3 {
+        self.0[node as usize]
+    }
+
+    /// Sum of forces on all nodes, in the frame [N], and their torque [N m].
+    pub(super) fn load_and_torque(&self, forces: impl Iterator<Item = DVec3>) -> [DVec3; 2] {
+        let sum =
+            |[load, torque]: [DVec3; 2], (r, f): (&DVec3, DVec3)| [load + f, torque + r.cross(f)];
+        self.0.iter().zip(forces).fold([DVec3::ZERO; 2], sum)
+    }
 }
 
 /// Rotations of one body in its frame.
@@ -72,10 +94,29 @@ impl Rotations {
         terms.map(|((&m, r), &d)| m * r.cross(DVec3::from_array(d))).sum()
     }
 
+    /// Acceleration of the nodes by a torque about the centre, over time [m/s²].
+    pub(super) fn turned_by(&self, torque: DVec3) -> impl Iterator<Item = DVec3> {
+        let turn = self.inverse_inertia * torque;
+        self.arms.iter().map(move |&r| turn.cross(r))
+    }
+
+    /// Takes the inertial loads of the motion as a whole out of `loads`.
+    pub(super) fn take_whole(&self, masses: &[f64], mass: f64, loads: &mut [[f64; 3]]) {
+        let (mut load, mut torque) = (DVec3::ZERO, DVec3::ZERO);
+        for (r, &f) in self.arms.iter().zip(&*loads) {
+            let f = DVec3::from_array(f);
+            load += f;
+            torque += r.cross(f);
+        }
+        let (acceleration, turn) = (load / mass, self.inverse_inertia * torque);
+        for ((&m, r), f) in masses.iter().zip(&self.arms).zip(loads) {
+            *f = (DVec3::from_array(*f) - m * (acceleration + turn.cross(*r))).to_array();
+        }
+    }
+
     /// Takes the inertial loads of the turn out of `loads`; returns their torque.
-    pub(super) fn balance(&self, masses: &[f64], loads: &mut [[f64; 3]]) -> DVec3 {
-        let pairs = self.arms.iter().zip(&*loads);
-        let torque: DVec3 = pairs.map(|(r, &f)| r.cross(DVec3::from_array(f))).sum();
+    pub(super) fn balance(&self, masses: &[f64], levers: &Levers, loads: &mut [[f64; 3]]) -> DVec3 {
+        let [_, torque] = levers.load_and_torque(loads.iter().map(|&f| DVec3::from_array(f)));
         let turn = self.inverse_inertia * torque;
         for ((&m, r), load) in masses.iter().zip(&self.arms).zip(loads) {
             *load = (DVec3::from_array(*load) - m * turn.cross(*r)).to_array();
@@ -137,13 +178,12 @@ impl Turning {
         &self.rotations
     }
 
-    /// What P adds to the response of A^-1 alone to a force on a node: a turn t and a counter-turn c per
-    /// force, by which a node moves `t x arm - response c`.
-    pub(crate) fn coefficients(&self, node: u32) -> [DMat3; 2] {
-        let arm = self.rotations.arms[node as usize];
+    /// What P adds to the response of A^-1 alone to a force on a node with a `lever`: a turn t and a
+    /// counter-turn c per force, by which a node moves `t x arm - response c`.
+    pub(crate) fn coefficients(&self, node: u32, lever: DVec3) -> [DMat3; 2] {
         let s = self.rotations.inverse_inertia;
         let torque =
-            DMat3::from_cols(arm.cross(DVec3::X), arm.cross(DVec3::Y), arm.cross(DVec3::Z));
+            DMat3::from_cols(lever.cross(DVec3::X), lever.cross(DVec3::Y), lever.cross(DVec3::Z));
         [self.both * torque - s * self.response(node).transpose(), s * torque]
     }
 
@@ -190,13 +230,16 @@ mod tests {
         for (node, load) in loads {
             response[node as usize] = load.to_array();
         }
-        let torque = turning.rotations().balance(&masses, &mut response);
+        let levers = Levers(points.map(|x| 0.9 * (x - center) + DVec3::splat(0.05)).to_vec());
+        let torque = turning.rotations().balance(&masses, &levers, &mut response);
         for (d, softness) in response.iter_mut().zip(softness) {
             *d = d.map(|value| softness * value);
         }
         turning.rotations().turn(&masses, torque, &mut response);
 
-        let coefficients = loads.map(|(node, load)| turning.coefficients(node).map(|c| c * load));
+        let coefficients = loads.map(|(node, load)| {
+            turning.coefficients(node, levers.of(node)).map(|coefficient| coefficient * load)
+        });
         let [turn, counter] = [0, 1].map(|k| coefficients[0][k] + coefficients[1][k]);
         for node in 0..5_u32 {
             let mut sum = turn.cross(turning.arm(node)) - turning.response(node) * counter;
@@ -211,8 +254,7 @@ mod tests {
         let spin: DVec3 = (0..5)
             .map(|i| masses[i] * (points[i] - center).cross(DVec3::from_array(response[i])))
             .sum();
-        let expected: DVec3 =
-            loads.iter().map(|&(i, f)| gain * (points[i as usize] - center).cross(f)).sum();
+        let expected: DVec3 = loads.iter().map(|&(i, f)| gain * levers.of(i).cross(f)).sum();
         assert!((spin - expected).length() < 1e-15);
     }
 }

@@ -126,7 +126,7 @@ impl Coupling {
     ) {
         let turning = body.elastic().and_then(|elastic| {
             self.nodes.gather(elastic, &body.compliance, nodes);
-            elastic.turning()
+            elastic.turning().zip(Some(elastic.levers()))
         });
         self.expected.clear();
         self.expected.resize(self.nodes.stride(), DVec3::ZERO);
@@ -134,17 +134,17 @@ impl Coupling {
             self.expected[self.nodes.slot(node)] += force;
         }
         self.turns.clear();
-        if let Some(turning) = turning {
+        if let Some((turning, levers)) = turning {
             self.turns.resize(self.nodes.stride(), [DMat3::ZERO; 2]);
             for &node in nodes {
-                self.turns[self.nodes.slot(node)] = turning.coefficients(node);
+                self.turns[self.nodes.slot(node)] = turning.coefficients(node, levers.of(node));
             }
         }
         for corners in &mut self.contacts {
             for place in 0..corners.count as usize {
                 corners.slots[place] = self.nodes.slot(corners.nodes[place]) as u32;
             }
-            if let Some(turning) = turning {
+            if let Some((turning, _)) = turning {
                 corners.set_turning(turning, &self.turns);
             }
         }

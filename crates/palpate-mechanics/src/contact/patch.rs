@@ -81,7 +81,7 @@ impl Patch {
                 }
             }
             let Some(turning) = turning else { continue };
-            let [turn, counter] = turning.coefficients(load);
+            let [turn, counter] = turning.coefficients(load, turning.arm(load));
             for (moved, &node) in self.nodes.iter().enumerate() {
                 let (arm, response) = (turning.arm(node), turning.response(node));
                 for axis in 0..3 {

@@ -338,9 +338,30 @@ impl ElasticBody {
         self.begin_correction(method.mean_edge);
         (method.iterations, method.known) = (0, 0);
         (method.effort, method.passes) = (0, 1);
+        self.step.expected.fill([0.0; 3]);
+        let apart = contact.filter(|_| self.step.turns);
+        if let Some(contact) = apart {
+            self.expect_motion(contact);
+        }
         self.relax(method, forces, contact);
         if self.is_unattached() {
-            self.put_momentum_right(x, forces, contact);
+            self.put_momentum_right(x, forces, contact.filter(|_| apart.is_none()));
+        }
+    }
+
+    /// Keeps what the expected contact forces do to an unattached body as a whole apart from the correction.
+    ///
+    /// What is squeezed between a tool and the ground bears forces that would turn it by radians, since
+    /// it has moved by a part of an edge from where they were in balance. Their change turns it back, but no tissue
+    /// would come back from having been there.
+    fn expect_motion(&mut self, contact: &[Point]) {
+        let gain = self.gain();
+        let Self { step, mass, .. } = self;
+        let to_frame = step.frame.transpose();
+        let in_frame = contact.iter().map(|&f| to_frame * DVec3::from_array(f));
+        let [load, torque] = step.levers.load_and_torque(in_frame);
+        for (e, turned) in step.expected.iter_mut().zip(step.rotations.turned_by(torque)) {
+            *e = (gain * (load / *mass + turned)).to_array();
         }
     }
 
@@ -430,19 +451,14 @@ impl ElasticBody {
         contact: &[Point],
     ) -> bool {
         let enough = SETTLED * method.mean_edge;
-        let squares = self.step.response.iter().map(|r| DVec3::from_array(*r).length_squared());
-        let response = squares.fold(0.0, f64::max).sqrt();
-        let moved = method.longest.max(response);
+        let moved = method.longest.max(self.step.farthest_response(&self.masses));
         if moved <= enough {
             return false;
         }
         if moved > FAMILIAR * method.mean_edge {
             method.known = 0;
         }
-        for (d, r) in self.step.correction.iter_mut().zip(&mut self.step.response) {
-            *d = std::array::from_fn(|k| d[k] + r[k]);
-            *r = [0.0; 3];
-        }
+        self.step.take_response();
         method.passes += 1;
         method.effort = method.effort.max(method.passes);
         self.relax(method, forces, Some(contact));
@@ -470,7 +486,9 @@ impl ElasticBody {
         self.remove_torque(self.next_spin(x, forces, contact.unwrap_or(&[])));
     }
 
-    /// Writes the forces that the correction so far leaves over.
+    /// Writes the forces that the correction so far leaves over, of an unattached body without those that move it
+    /// as a whole: its momenta tell how it moves, and iterations on that would undo it, since the forces
+    /// have other levers by then.
     fn find_residual(&self, method: &mut QuasiNewton, forces: &[Point], contact: Option<&[Point]>) {
         let step = &self.step;
         let (frame, to_frame) = (step.frame, step.frame.transpose());
@@ -494,6 +512,9 @@ impl ElasticBody {
             let left = to_frame * force - inertia * self.masses[node] * DVec3::from_array(d);
             *residual = left.to_array();
         }
+        if step.turns {
+            step.rotations.take_whole(&self.masses, self.mass, &mut method.residual);
+        }
     }
 
     /// Writes the next move to `scratch`; returns its longest part [m].
@@ -507,6 +528,7 @@ impl ElasticBody {
         }
         // Elements of these laws turn by themselves.
         self.solve(scratch, None);
+        self.turn(DVec3::ZERO, scratch);
         for pair in &pairs[..known] {
             let beta = pair.rho * dot(&pair.y, scratch);
             add_scaled(scratch, pair.alpha - beta, &pair.s);

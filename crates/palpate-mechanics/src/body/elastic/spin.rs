@@ -80,8 +80,7 @@ impl ElasticBody {
     /// The response to contact turns the body by an amount of second order too much; positions stay,
     /// or surfaces would overlap, and the velocities are put right. Not where
     /// that makes a body faster which rests under its weight and which contact turns back in every step: it would
-    /// keep a velocity that moves nothing. Nor with the linear law, whose internal forces have a torque,
-    /// wherever that makes a touched body faster.
+    /// keep a velocity that moves nothing.
     pub(super) fn correct_spin(&self, target: DVec3, touched: bool, x: &[Point], v: &mut [Point]) {
         let now = Inertia::new(&self.masses, x, v);
         let inverse = now.tensor.inverse();
@@ -94,7 +93,7 @@ impl ElasticBody {
             let fastest = squares.fold(0.0, f64::max).sqrt();
             fastest <= RESTING * self.gravity.length() * self.time_step
         };
-        if !omega.is_finite() || (touched && gains_energy && (self.is_linear() || rests())) {
+        if !omega.is_finite() || (touched && gains_energy && rests()) {
             return;
         }
         for (v, &x) in v.iter_mut().zip(x) {

@@ -7,7 +7,7 @@ use palpate_solver::{BlockMatrix, SolveWorkspace};
 
 use super::{ElasticBody, Elasticity, FIXED};
 use crate::body::inertia::{Inertia, RunningInertia};
-use crate::body::turning::{Rotations, Turning, largest_change};
+use crate::body::turning::{Levers, Rotations, Turning, largest_change};
 use crate::state::BodyState;
 
 /// Part of the body's radius by which its shape may change before its response is computed again.
@@ -28,15 +28,17 @@ pub(super) struct Step {
     pub(super) force: Vec<[f64; 3]>,
     /// Correction of the free nodes in the frame [m].
     pub(super) correction: Vec<[f64; 3]>,
-    /// Response of the free nodes in the frame to the contact forces that are expected [m].
-    expected: Vec<[f64; 3]>,
+    /// Response of the free nodes in the frame to the contact forces that are expected [m]; with nonlinear laws
+    /// only that of the body as a whole.
+    pub(super) expected: Vec<[f64; 3]>,
     /// Response to the change of contact forces [m].
     pub(super) response: Vec<[f64; 3]>,
     /// Rotations of the predicted positions of an unattached body.
-    rotations: Rotations,
+    pub(super) rotations: Rotations,
+    pub(super) levers: Levers,
     /// Whether contact forces turn the body by these rotations alone, as the compliance between contacts
     /// has it, whatever the law: what differs from that takes contacts for kept that are not.
-    turns: bool,
+    pub(super) turns: bool,
     /// How contact forces turn the body: known once it has been touched in about this shape.
     pub(super) turning: Turning,
     pub(super) turning_known: bool,
@@ -77,6 +79,7 @@ impl Step {
             expected: vec![[0.0; 3]; free_count],
             response: vec![[0.0; 3]; free_count],
             rotations: Rotations::default(),
+            levers: Levers::default(),
             turns: false,
             turning: Turning::default(),
             turning_known: false,
@@ -100,6 +103,29 @@ impl Step {
             for (d, &node) in self.correction.iter_mut().zip(free_nodes) {
                 *d = (-less * self.deformation[node as usize]).to_array();
             }
+        }
+    }
+
+    /// Farthest that the response moves a node, together with what the expected forces turn the body [m].
+    pub(super) fn farthest_response(&self, masses: &[f64]) -> f64 {
+        let mean = if self.turns {
+            let moments = masses.iter().zip(&self.expected).map(|(&m, &e)| m * DVec3::from(e));
+            moments.sum::<DVec3>() / masses.iter().sum::<f64>()
+        } else {
+            DVec3::ZERO
+        };
+        let both = self.response.iter().zip(&self.expected);
+        let squares =
+            both.map(|(&r, &e)| (DVec3::from(r) + DVec3::from(e) - mean).length_squared());
+        squares.fold(0.0, f64::max).sqrt()
+    }
+
+    /// Makes the response a part of the correction, expected forces and change together.
+    pub(super) fn take_response(&mut self) {
+        let responses = self.expected.iter_mut().zip(&mut self.response);
+        for (d, (e, r)) in self.correction.iter_mut().zip(responses) {
+            *d = std::array::from_fn(|k| d[k] + e[k] + r[k]);
+            (*e, *r) = ([0.0; 3], [0.0; 3]);
         }
     }
 
@@ -142,7 +168,7 @@ impl ElasticBody {
             self.predict_driven(x, part);
         }
         (self.step.center, self.step.frame) = self.place_of(self.step.positions.iter().copied());
-        self.find_rotations();
+        self.find_rotations(x);
         let mut elasticity = std::mem::take(&mut self.elasticity);
         self.find_deformation();
         self.step.touched = contact.is_some();
@@ -270,7 +296,7 @@ impl ElasticBody {
 
     /// Finds the rotations of an unattached body as predicted, and gives up what is known of its
     /// turning when it has deformed since.
-    fn find_rotations(&mut self) {
+    fn find_rotations(&mut self, x: &[Point]) {
         if !self.is_unattached() {
             return;
         }
@@ -279,6 +305,9 @@ impl ElasticBody {
         let Self { step, masses, .. } = self;
         let arms = step.positions.iter().map(|&x| to_frame * (x - center));
         step.turns = step.rotations.set(masses, arms, gain);
+        let start = step.start.center;
+        step.levers.0.clear();
+        step.levers.0.extend(x.iter().map(|&x| to_frame * (DVec3::from_array(x) - start)));
         let (arms, known) = (step.rotations.arms(), step.turning.rotations().arms());
         step.turning_known &= step.turns
             && largest_change(arms.iter().copied(), known.iter().copied()) <= SHAPE_TOLERANCE;
@@ -287,6 +316,11 @@ impl ElasticBody {
     /// How contact forces turn the body; `None` if it is attached.
     pub(crate) fn turning(&self) -> Option<&Turning> {
         self.step.turning_known.then_some(&self.step.turning)
+    }
+
+    /// Where forces act on the body, in the step that has begun; nowhere if it is attached.
+    pub(crate) fn levers(&self) -> &Levers {
+        &self.step.levers
     }
 
     /// The shape for which the turning is known; empty if it is not.
@@ -371,10 +405,11 @@ impl ElasticBody {
     }
 
     fn balance(&self, loads: &mut [[f64; 3]]) -> DVec3 {
-        if self.step.turns { self.step.rotations.balance(&self.masses, loads) } else { DVec3::ZERO }
+        let Step { rotations, levers, turns, .. } = &self.step;
+        if *turns { rotations.balance(&self.masses, levers, loads) } else { DVec3::ZERO }
     }
 
-    fn turn(&self, torque: DVec3, response: &mut [[f64; 3]]) {
+    pub(super) fn turn(&self, torque: DVec3, response: &mut [[f64; 3]]) {
         if self.step.turns {
             self.step.rotations.turn(&self.masses, torque, response);
         }
