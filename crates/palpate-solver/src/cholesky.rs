@@ -20,7 +20,7 @@ use crate::ordering::{NONE, NodeOrder, OrderingMethod};
 use crate::{BlockMatrix, BlockPattern};
 use block_float::BlockFloat;
 use changes::{Contribution, Kept, Older, Plan};
-pub use half::{HalfSolution, half_products};
+pub use half::{HalfSolution, half_products, half_products_between};
 use half::{HalfWorkspace, NODES, Paths};
 use memory::{Memory, SharedMemory, Spare};
 use packed::{PackedFactor, PackedWorkspace, Panel};
@@ -412,6 +412,11 @@ impl Cholesky {
     /// The order of elimination.
     pub fn order(&self) -> &NodeOrder {
         &self.order
+    }
+
+    /// The precision that was asked for.
+    pub fn precision(&self) -> Precision {
+        self.precision
     }
 
     /// Number of nodes.

@@ -12,6 +12,7 @@ pub mod rows;
 pub use block_matrix::{BlockMatrix, BlockPattern};
 pub use cholesky::{
     Cholesky, FactorError, FactorStats, HalfSolution, Precision, SolveWorkspace, half_products,
+    half_products_between,
 };
 pub use ordering::{NodeOrder, OrderingMethod};
 pub use rows::add_rows;

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use palpate_solver::{
     BlockMatrix, BlockPattern, Cholesky, FactorError, HalfSolution, NodeOrder, Precision,
-    half_products,
+    half_products, half_products_between,
 };
 use proptest::prelude::*;
 
@@ -179,6 +179,19 @@ proptest! {
         let mut halves = vec![HalfSolution::default(); nodes.len()];
         factor.half_solve(&nodes, &mut halves, &mut workspace);
         let mut lengths = Vec::new();
+        let paths: Vec<Vec<u32>> = nodes
+            .iter()
+            .map(|&node| {
+                factor.common_lengths(node as usize, &mut lengths);
+                lengths.clone()
+            })
+            .collect();
+        let all: Vec<&HalfSolution> = halves.iter().collect();
+        let common = |m: usize, l: usize| paths[l][factor.branch(nodes[m] as usize)];
+        let mut between = vec![[0.0; 9]; nodes.len() * nodes.len()];
+        half_products_between(&all, &all, common, |m, l, product| {
+            between[l * nodes.len() + m] = product;
+        });
         for (&loaded, half) in nodes.iter().zip(&halves) {
             factor.common_lengths(loaded as usize, &mut lengths);
             let common = |node: u32| lengths[factor.branch(node as usize)];
@@ -188,6 +201,9 @@ proptest! {
             let pairs = nodes.iter().zip(&halves).map(|(&node, other)| ([half, other], common(node)));
             let mut turned = Vec::new();
             half_products(pairs, |product| turned.push(product));
+            let (together, rest) = between.split_at(nodes.len());
+            prop_assert_eq!(together, &*found);
+            between = rest.to_vec();
             for axis in 0..3 {
                 let mut unit = vec![[0.0; 3]; node_count];
                 unit[loaded as usize][axis] = 1.0;

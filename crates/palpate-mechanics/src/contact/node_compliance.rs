@@ -1,6 +1,6 @@
 //! The compliance between the contact nodes of one body, the products of their half solutions.
 
-use palpate_solver::half_products;
+use palpate_solver::half_products_between;
 
 use super::compliance::ComplianceCache;
 use crate::body::ElasticBody;
@@ -33,8 +33,8 @@ pub(crate) struct NodeCompliance {
     rank: Vec<u32>,
     /// For some new nodes: what they have in common with others.
     lengths: [Vec<u32>; TOGETHER],
-    /// Pairs of slots to be multiplied, and what they have in common.
-    pairs: Vec<([u32; 2], u32)>,
+    /// Slots whose nodes are multiplied with these, and their branches.
+    others: Vec<(u32, u32)>,
 }
 
 impl NodeCompliance {
@@ -131,31 +131,42 @@ impl NodeCompliance {
             for (lengths, &slot) in self.lengths.iter_mut().zip(tile) {
                 body.common_lengths(self.nodes[slot as usize], lengths);
             }
-            self.pairs.clear();
+            self.others.clear();
             for (other, &node) in self.nodes.iter().enumerate().filter(|&(_, &node)| node != NONE) {
-                let branch = body.branch(node);
-                for ((rank, &slot), lengths) in (first..).zip(tile).zip(&self.lengths) {
-                    // Those that are new later have their turn with this one then.
-                    if self.rank[other] <= rank {
-                        self.pairs.push(([other as u32, slot], lengths[branch]));
-                    }
+                // Those that are new later have their turn with this one then.
+                if self.rank[other] < first + tile.len() as u32 {
+                    self.others.push((other as u32, body.branch(node) as u32));
                 }
             }
             let half = |slot: u32| cache.half(self.nodes[slot as usize]).expect("prepared");
-            let halves = self.pairs.iter().map(|&(slots, common)| (slots.map(half), common));
-            let (values, stride) = (&mut self.values, self.stride);
-            let mut pairs = self.pairs.iter();
-            half_products(halves, |entries| {
-                let &([moved, loaded], _) = pairs.next().expect("one product per pair");
-                let (moved, loaded) = (moved as usize, loaded as usize);
-                for axis in 0..3 {
-                    for k in 0..3 {
-                        let entry = entries[3 * axis + k];
-                        values[(loaded * 9 + 3 * axis + k) * stride + moved] = entry;
-                        values[(moved * 9 + 3 * k + axis) * stride + loaded] = entry;
-                    }
+            let mut loaded = [half(tile[0]); TOGETHER];
+            for (loaded, &slot) in loaded.iter_mut().zip(tile) {
+                *loaded = half(slot);
+            }
+            let (values, stride, lengths) = (&mut self.values, self.stride, &self.lengths);
+            for others in self.others.chunks(TOGETHER) {
+                let mut moved = loaded;
+                for (moved, &(slot, _)) in moved.iter_mut().zip(others) {
+                    *moved = half(slot);
                 }
-            });
+                let common =
+                    |moved: usize, loaded: usize| lengths[loaded][others[moved].1 as usize];
+                half_products_between(
+                    &moved[..others.len()],
+                    &loaded[..tile.len()],
+                    common,
+                    |moved, loaded, entries| {
+                        let (moved, loaded) = (others[moved].0 as usize, tile[loaded] as usize);
+                        for axis in 0..3 {
+                            for k in 0..3 {
+                                let entry = entries[3 * axis + k];
+                                values[(loaded * 9 + 3 * axis + k) * stride + moved] = entry;
+                                values[(moved * 9 + 3 * k + axis) * stride + loaded] = entry;
+                            }
+                        }
+                    },
+                );
+            }
         }
     }
 

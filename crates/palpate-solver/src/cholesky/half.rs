@@ -72,19 +72,8 @@ where
     #[inline(always)]
     fn with_simd<S: Simd>(mut self, simd: S) {
         for ([moved, loaded], common) in self.pairs {
-            let moved = [0, 1, 2].map(|k| S::as_simd_f32s(&moved.axis(k)[..common as usize]).0);
-            let loaded = [0, 1, 2].map(|k| S::as_simd_f32s(&loaded.axis(k)[..common as usize]).0);
             let mut sums = [simd.splat_f32s(0.0); 9];
-            let vectors = (moved[0].iter().zip(moved[1]).zip(moved[2]))
-                .zip(loaded[0].iter().zip(loaded[1]).zip(loaded[2]));
-            for (((&ax, &ay), &az), ((&bx, &by), &bz)) in vectors {
-                let (a, b) = ([ax, ay, az], [bx, by, bz]);
-                for axis in 0..3 {
-                    for k in 0..3 {
-                        sums[3 * axis + k] = simd.mul_add_f32s(a[k], b[axis], sums[3 * axis + k]);
-                    }
-                }
-            }
+            add_products(simd, [moved, loaded], 0..common as usize, &mut sums);
             let mut result = [0.0; 9];
             for (value, sum) in result.iter_mut().zip(sums) {
                 *value = simd.reduce_sum_f32s(sum);
@@ -92,6 +81,103 @@ where
             (self.store)(result);
         }
     }
+}
+
+/// Loaded and moved half solutions whose products are made together, and entries of each that caches hold
+/// meanwhile.
+const TILE: [usize; 2] = [8, 4];
+const PART: usize = 16 * LANES;
+
+/// [`half_products`] of all `moved` with all `loaded`, to the last bit, when they are many: each is read once for
+/// a few of the others. `common(moved, loaded)` is what two of them have in common, by their places, and `store`
+/// takes their places and the product.
+///
+/// # Panics
+/// As [`half_products`].
+pub fn half_products_between(
+    moved: &[&HalfSolution],
+    loaded: &[&HalfSolution],
+    common: impl Fn(usize, usize) -> u32,
+    store: impl FnMut(usize, usize, [f32; 9]),
+) {
+    pulp::Arch::new().dispatch(ProductsBetween { moved, loaded, common, store });
+}
+
+struct ProductsBetween<'a, C, F> {
+    moved: &'a [&'a HalfSolution],
+    loaded: &'a [&'a HalfSolution],
+    common: C,
+    store: F,
+}
+
+impl<C, F> pulp::WithSimd for ProductsBetween<'_, C, F>
+where
+    C: Fn(usize, usize) -> u32,
+    F: FnMut(usize, usize, [f32; 9]),
+{
+    type Output = ();
+
+    #[allow(clippy::inline_always)] // as above
+    #[inline(always)]
+    fn with_simd<S: Simd>(mut self, simd: S) {
+        for (first_loaded, loaded) in (0..).step_by(TILE[0]).zip(self.loaded.chunks(TILE[0])) {
+            for (first_moved, moved) in (0..).step_by(TILE[1]).zip(self.moved.chunks(TILE[1])) {
+                let mut ends = [[0; TILE[1]]; TILE[0]];
+                let mut longest = 0;
+                for (l, ends) in ends.iter_mut().take(loaded.len()).enumerate() {
+                    for (m, end) in ends.iter_mut().take(moved.len()).enumerate() {
+                        *end = (self.common)(first_moved + m, first_loaded + l) as usize;
+                        longest = longest.max(*end);
+                    }
+                }
+                let mut sums = [[[simd.splat_f32s(0.0); 9]; TILE[1]]; TILE[0]];
+                for begin in (0..longest).step_by(PART) {
+                    for ((l, sums), ends) in loaded.iter().zip(&mut sums).zip(&ends) {
+                        for ((m, sums), &end) in moved.iter().zip(sums).zip(ends) {
+                            let end = end.min(begin + PART);
+                            if begin < end {
+                                add_products(simd, [m, l], begin..end, sums);
+                            }
+                        }
+                    }
+                }
+                for (l, sums) in sums.iter().take(loaded.len()).enumerate() {
+                    for (m, sums) in sums.iter().take(moved.len()).enumerate() {
+                        let mut result = [0.0; 9];
+                        for (value, &sum) in result.iter_mut().zip(sums) {
+                            *value = simd.reduce_sum_f32s(sum);
+                        }
+                        (self.store)(first_moved + m, first_loaded + l, result);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Adds the products of some entries of two half solutions.
+#[allow(clippy::inline_always)] // as above
+#[inline(always)]
+fn add_products<S: Simd>(
+    simd: S,
+    [moved, loaded]: [&HalfSolution; 2],
+    entries: std::ops::Range<usize>,
+    sums: &mut [S::f32s; 9],
+) {
+    let moved = [0, 1, 2].map(|k| S::as_simd_f32s(&moved.axis(k)[entries.clone()]).0);
+    let loaded = [0, 1, 2].map(|k| S::as_simd_f32s(&loaded.axis(k)[entries.clone()]).0);
+    let mut own = *sums;
+    let vectors = (moved[0].iter().zip(moved[1]).zip(moved[2]))
+        .zip(loaded[0].iter().zip(loaded[1]).zip(loaded[2]));
+    for (((&ax, &ay), &az), ((&bx, &by), &bz)) in vectors {
+        let (a, b) = ([ax, ay, az], [bx, by, bz]);
+        for axis in 0..3 {
+            for k in 0..3 {
+                own[3 * axis + k] = simd.mul_add_f32s(a[k], b[axis], own[3 * axis + k]);
+            }
+        }
+    }
+    *sums = own;
 }
 
 /// Where the parts of half solutions stand: the tree of the pieces of supernodes.
