@@ -210,7 +210,6 @@ fn tie(offset: DVec3, distance: f64) -> Candidate {
         distance,
         stiffness: 0.0,
         recovery: 0.0,
-        limit: f64::INFINITY,
         friction: 0.0,
         tied: Some(offset),
     }

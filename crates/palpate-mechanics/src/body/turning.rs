@@ -81,13 +81,6 @@ impl Rotations {
         &self.arms
     }
 
-    /// Mean of displacements, and the turn in them.
-    pub(super) fn rigid_part(&self, masses: &[f64], values: &[[f64; 3]]) -> (DVec3, DVec3) {
-        let moments = masses.iter().zip(values).map(|(&m, &d)| m * DVec3::from_array(d));
-        let mean = moments.sum::<DVec3>() / masses.iter().sum::<f64>();
-        (mean, self.inverse_inertia * self.moment(masses, values))
-    }
-
     /// Angular momentum of displacements.
     fn moment(&self, masses: &[f64], values: &[[f64; 3]]) -> DVec3 {
         let terms = masses.iter().zip(&self.arms).zip(values);

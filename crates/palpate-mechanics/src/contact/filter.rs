@@ -37,11 +37,6 @@ const RECOVERY_TIME: f64 = 0.05;
 /// The same where they are only closer than it, as a pair may be that has just begun to count because its
 /// direction changed: pushed apart at once it would cease to count, and the two would never rest.
 const GENTLE_RECOVERY_TIME: f64 = 0.5;
-/// Largest force of a contact, in forces of the soft penalty at full overlap: a pressure of some ten times
-/// Young's modulus, by which tissue is crushed. Between a tool and the ground, which cannot give way,
-/// forces would grow without bound.
-const LARGEST_FORCE: f64 = 20.0;
-
 /// Two contacts of a node are one when their directions and gaps (in contact distances) agree so well.
 const TWIN_COSINE: f64 = 0.9999;
 const TWIN_GAP: f64 = 0.01;
@@ -67,8 +62,6 @@ pub(crate) struct Candidate {
     pub(crate) stiffness: f64,
     /// Largest gap at the end of the step that the contact may push to [m].
     pub(crate) recovery: f64,
-    /// Largest normal force [N].
-    pub(crate) limit: f64,
     pub(crate) friction: f64,
     /// For a tie: from where side a should be to where it is at the start of the step [m]. A tie works
     /// against that in every direction with its stiffness; gap, recovery and friction do not count.
@@ -437,7 +430,6 @@ fn candidate(
         offset: 0.0,
         distance,
         stiffness,
-        limit: LARGEST_FORCE * stiffness * distance,
         recovery: gap + distance * time_step / recovery_time,
         friction: a.friction(b),
         tied: None,

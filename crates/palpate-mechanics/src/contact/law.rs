@@ -75,8 +75,6 @@ pub(super) struct ContactLaw {
     /// Penalty by the overlap; the steeper one of a deep overlap; as hard as it takes to reach the
     /// recovery gap, which is less than the penalty.
     pieces: [Piece; 3],
-    /// Largest normal force [N].
-    limit: f64,
     friction: f64,
     /// Slip without contact forces [m].
     slip: DVec2,
@@ -109,7 +107,6 @@ impl ContactLaw {
                 piece(hard, candidate.distance - soft_part + soft_part / HARDENING),
                 piece(hard, candidate.recovery),
             ],
-            limit: candidate.limit,
             friction: candidate.friction,
             slip: block.free.yz(),
             pressed,
@@ -121,7 +118,7 @@ impl ContactLaw {
 
     /// Nearest force that the contact can carry.
     fn admissible(&self, force: DVec3) -> DVec3 {
-        let normal = force.x.clamp(0.0, self.limit);
+        let normal = force.x.max(0.0);
         let friction = force.yz().clamp_length_max(self.friction * normal);
         DVec3::new(normal, friction.x, friction.y)
     }
@@ -131,7 +128,7 @@ impl ContactLaw {
     fn answer(&self, force: DVec3, moved: DVec3) -> DVec3 {
         let others = moved.x - self.pressed * force.x;
         let [elastic, hard, recovering] = self.pieces.map(|p| (p.target - others) * p.stiffness);
-        let normal = elastic.max(hard).min(recovering).clamp(0.0, self.limit);
+        let normal = elastic.max(hard).min(recovering).max(0.0);
         if normal == 0.0 || self.friction == 0.0 {
             return DVec3::new(normal, 0.0, 0.0);
         }
@@ -148,11 +145,7 @@ impl ContactLaw {
         let [elastic, hard, recovering] =
             self.pieces.map(|p| p.target - moved.x - p.softness * force.x);
         let gap = elastic.max(hard).min(recovering);
-        let gap = match force.x {
-            normal if normal <= 0.0 => gap.max(0.0),
-            normal if normal >= self.limit => (-gap).max(0.0),
-            _ => gap.abs(),
-        };
+        let gap = if force.x > 0.0 { gap.abs() } else { gap.max(0.0) };
         let slip = self.slip + moved.yz();
         let softest = self.rubbed.max_element();
         let limit = self.friction * force.x;

@@ -113,7 +113,6 @@ fn random_problem(kind: Kind) -> Known {
             distance,
             stiffness: 1e3 * kind.stiffness * random.between(0.5, 2.0),
             recovery: gap + distance / 3.0,
-            limit: f64::INFINITY,
             friction: kind.friction.map_or(0.0, |most| random.between(0.2, 1.0) * most),
             tied: None,
         });

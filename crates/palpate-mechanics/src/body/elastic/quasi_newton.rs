@@ -23,16 +23,11 @@ const MEMORY: usize = 5;
 const TOLERANCE: f64 = 3e-4;
 /// Most iterations of a step.
 const MAX_ITERATIONS: usize = 10;
-/// Most iterations while contact forces are held: what touches gives way otherwise than forces do.
-const MAX_HELD_ITERATIONS: usize = 2;
-/// While contact forces are held a move must be this much shorter than the one before: a compressed
-/// body that is held by forces instead of by what it touches is unstable, and would run away.
-const SHRINKING: f64 = 0.5;
+/// The same while contact forces are held: a compressed body that is held by forces instead of by what it
+/// touches, which gives way otherwise, is unstable.
+const MAX_HELD_ITERATIONS: usize = 1;
 /// Moves smaller than this, in mean edges, are not worth another solve for the contact forces.
 const SETTLED: f64 = 0.1;
-/// Between passes that move a node by more than this, in mean edges, what was learned of the tissue is
-/// forgotten: what is crushed is another tissue in every pass.
-const FAMILIAR: f64 = 1.5;
 /// Iterations of a step, or solves for its contact forces, after which A is made anew.
 const SLOW: u32 = 6;
 /// The same when a node has moved by more than this part of the body's radius since, apart from the
@@ -46,10 +41,6 @@ const SOON: f64 = 0.05;
 const OVERSHOT: f64 = 0.5;
 const MAX_SHORTENED: usize = 6;
 const SHORTEST: f64 = 0.1;
-/// Farthest that a node goes by deformation before the first iteration, in mean edges.
-const FARTHEST_START: f64 = 0.5;
-/// Farthest that the response to contact moves a node by deformation at a time, in mean edges.
-const LONGEST_RESPONSE: f64 = 2.0;
 /// Farthest that a node moves in an iteration, in mean edges.
 const LONGEST_MOVE: f64 = 1.0;
 
@@ -183,16 +174,16 @@ impl QuasiNewton {
         self.unknown = changed;
     }
 
-    /// Remembers how the residual, before in the scratch memory, has changed by the last move; false where
-    /// it has not turned against it. Contact forces are the same before and after.
-    fn remember_move(&mut self) -> bool {
+    /// Remembers how the residual, before in the scratch memory, has changed by the last move, where
+    /// it has turned against it. Contact forces are the same before and after.
+    fn remember_move(&mut self) {
         let pair = &mut self.pairs[self.known];
         for ((y, r), before) in pair.y.iter_mut().zip(&self.residual).zip(&self.scratch) {
             *y = std::array::from_fn(|k| before[k] - r[k]);
         }
         let product = dot(&pair.s, &pair.y);
         if product <= 0.0 {
-            return false;
+            return;
         }
         pair.rho = product.recip();
         self.known += 1;
@@ -200,12 +191,6 @@ impl QuasiNewton {
             self.pairs.rotate_left(1);
             self.known -= 1;
         }
-        true
-    }
-
-    /// Farthest that the response to contact may move a node by deformation [m].
-    pub(super) fn longest_response(&self) -> f64 {
-        LONGEST_RESPONSE * self.mean_edge
     }
 
     /// Finds the internal forces at the end of the step that has begun.
@@ -335,7 +320,7 @@ impl ElasticBody {
         contact: Option<&[Point]>,
     ) {
         method.tissue.begin_step(x, self.time_step);
-        self.begin_correction(method.mean_edge);
+        self.step.correction.fill([0.0; 3]);
         (method.iterations, method.known) = (0, 0);
         (method.effort, method.passes) = (0, 1);
         self.step.expected.fill([0.0; 3]);
@@ -365,31 +350,17 @@ impl ElasticBody {
         }
     }
 
-    /// Begins where the body would be if it went on with its deformation, or only with a part of it where
-    /// that is large: far beyond its shape a stiff body has forces from which iterations do not come back.
-    fn begin_correction(&mut self, mean_edge: f64) {
-        let way = self.time_step * self.step.fastest_deformation();
-        let less = (1.0 - FARTHEST_START * mean_edge / way).max(0.0) * self.time_step;
-        self.step.begin_correction(less, &self.free_nodes);
-    }
-
     /// Iterates from the present correction, with care while contact forces are held. What was learned of
     /// the tissue under other contact forces of this step still holds: where it is stiffer than A says, each pass
     /// would go too far anew.
     fn relax(&mut self, method: &mut QuasiNewton, forces: &[Point], contact: Option<&[Point]>) {
-        let held = contact.is_some();
-        let most = if held { MAX_HELD_ITERATIONS } else { MAX_ITERATIONS };
-        let mut last = f64::INFINITY;
+        let most = if contact.is_some() { MAX_HELD_ITERATIONS } else { MAX_ITERATIONS };
         self.find_residual(method, forces, contact);
         for iteration in 0..most {
             let longest = self.next_move(method);
-            if held && longest > SHRINKING * last {
-                break;
-            }
             method.iterations += 1;
             method.effort = method.effort.max(iteration as u32 + 1);
             method.longest = longest;
-            last = longest;
             self.make_move(method, longest);
             if longest <= TOLERANCE * method.mean_edge {
                 break;
@@ -397,9 +368,7 @@ impl ElasticBody {
             std::mem::swap(&mut method.scratch, &mut method.residual);
             self.find_residual(method, forces, contact);
             self.shorten_move(method, forces, contact);
-            if !method.remember_move() && held {
-                break;
-            }
+            method.remember_move();
         }
     }
 
@@ -454,9 +423,6 @@ impl ElasticBody {
         let moved = method.longest.max(self.step.farthest_response(&self.masses));
         if moved <= enough {
             return false;
-        }
-        if moved > FAMILIAR * method.mean_edge {
-            method.known = 0;
         }
         self.step.take_response();
         method.passes += 1;

@@ -96,16 +96,6 @@ impl Step {
         self.center
     }
 
-    /// Begins with a correction that takes the deformation of the last `less` seconds back.
-    pub(super) fn begin_correction(&mut self, less: f64, free_nodes: &[u32]) {
-        self.correction.fill([0.0; 3]);
-        if less > 0.0 {
-            for (d, &node) in self.correction.iter_mut().zip(free_nodes) {
-                *d = (-less * self.deformation[node as usize]).to_array();
-            }
-        }
-    }
-
     /// Farthest that the response moves a node, together with what the expected forces turn the body [m].
     pub(super) fn farthest_response(&self, masses: &[f64]) -> f64 {
         let mean = if self.turns {
@@ -127,12 +117,6 @@ impl Step {
             *d = std::array::from_fn(|k| d[k] + e[k] + r[k]);
             (*e, *r) = ([0.0; 3], [0.0; 3]);
         }
-    }
-
-    /// Largest velocity of the deformation at a node [m/s].
-    pub(super) fn fastest_deformation(&self) -> f64 {
-        let squares = self.deformation.iter().map(|v| v.length_squared());
-        squares.fold(0.0, f64::max).sqrt()
     }
 
     /// Velocity of the deformation at a node, in the frame [m/s].
@@ -357,34 +341,7 @@ impl ElasticBody {
         let torque = self.balance(&mut response);
         self.solve(&mut response, None);
         self.turn(torque, &mut response);
-        if let Elasticity::Nonlinear(method) = &self.elasticity {
-            self.limit(&mut response, method.longest_response());
-        }
         self.step.response = response;
-    }
-
-    /// Shortens a response whose deformation moves a node farther than `longest` [m]: there A says nothing
-    /// about a nonlinear body any more, and iterations would not come back. The motion as a whole stays.
-    fn limit(&self, response: &mut [[f64; 3]], longest: f64) {
-        let (mut mean, mut turn) = (DVec3::ZERO, DVec3::ZERO);
-        let unattached = self.is_unattached();
-        if unattached {
-            (mean, turn) = self.step.rotations.rigid_part(&self.masses, response);
-        }
-        let arms = self.step.rotations.arms();
-        let rigid = |node: u32| {
-            if unattached { mean + turn.cross(arms[node as usize]) } else { DVec3::ZERO }
-        };
-        let deformations =
-            self.free_nodes.iter().zip(&*response).map(|(&node, &d)| DVec3::from(d) - rigid(node));
-        let largest = deformations.map(DVec3::length_squared).fold(0.0, f64::max).sqrt();
-        if largest > longest {
-            let part = longest / largest;
-            for (&node, d) in self.free_nodes.iter().zip(response) {
-                let rigid = rigid(node);
-                *d = (rigid + part * (DVec3::from(*d) - rigid)).to_array();
-            }
-        }
     }
 
     /// Improves the step under contact forces that are not those that it was predicted with; true if
