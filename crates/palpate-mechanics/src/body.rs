@@ -47,6 +47,8 @@ pub(crate) struct MovingBody {
     pub(crate) touched: bool,
     /// Whether the last step ended with a new matrix.
     pub(crate) refactored: bool,
+    /// Whether a step that took many iterations leaves the matrix as it is: another one is being made.
+    pub(crate) waits_for_matrix: bool,
 }
 
 /// How far the surface moves in the step that has begun.
@@ -100,6 +102,7 @@ impl MovingBody {
             new_columns: 0,
             touched: false,
             refactored: false,
+            waits_for_matrix: false,
             kind,
         };
         match &result.kind {
@@ -238,11 +241,14 @@ impl MovingBody {
         }
     }
 
-    /// Improves the step of a body that contact forces act on; true if they must be solved for again.
-    pub(crate) fn improve(&mut self, surface: &[u32]) -> bool {
-        let BodyKind::Elastic(elastic) = &mut self.kind else { return false };
+    /// Improves the step of a body that contact forces act on, unless it has settled, in a step that
+    /// `is_changing` bodies more or less; true if they must be solved for again.
+    pub(crate) fn improve(&mut self, surface: &[u32], is_changing: bool) -> bool {
+        let is_changing = is_changing || self.waits_for_matrix;
+        let Self { kind, positions, forces, contact_forces, .. } = self;
+        let BodyKind::Elastic(elastic) = kind else { return false };
         let touched = self.touched || !self.expected_nodes.is_empty();
-        if !touched || !elastic.improve(&self.positions, &self.forces, &self.contact_forces) {
+        if !touched || !elastic.improve(positions, forces, contact_forces, is_changing) {
             return false;
         }
         expect(&self.contact_forces, surface, &mut self.expected_forces, &mut self.expected_nodes);
@@ -313,7 +319,9 @@ impl MovingBody {
         std::mem::swap(&mut self.positions, &mut self.next_positions);
         std::mem::swap(&mut self.velocities, &mut self.next_velocities);
         self.refactored = match &mut self.kind {
-            BodyKind::Elastic(elastic) => elastic.refresh_if_slow(&self.positions),
+            BodyKind::Elastic(elastic) => {
+                elastic.refresh_if_slow(&self.positions, self.waits_for_matrix)
+            }
             BodyKind::Rigid(_) => false,
         };
         if self.refactored {

@@ -137,6 +137,8 @@ pub struct Dynamics {
     part: f64,
     /// Whether a step that blows tetrahedra up fails.
     strict: bool,
+    /// Whether a prepared change takes place in this step.
+    is_changing: bool,
 }
 
 impl Dynamics {
@@ -229,6 +231,7 @@ impl Dynamics {
             predict_time: Duration::ZERO,
             part: 1.0,
             strict: false,
+            is_changing: false,
         };
         dynamics.put_bodies(bodies);
         Ok(dynamics)
@@ -363,6 +366,7 @@ impl Dynamics {
         let mut response = std::mem::take(&mut self.response);
         let result = self.finish_with(&mut response, proximity, penetration);
         self.response = response;
+        self.is_changing = false;
         result
     }
 
@@ -440,9 +444,10 @@ impl Dynamics {
     /// again.
     fn improve(&mut self) -> bool {
         let surfaces = std::mem::take(&mut self.surfaces);
+        let is_changing = self.is_changing;
         let changed = AtomicUsize::new(0);
         self.for_each_body(|index, body| {
-            let again = body.improve(surfaces[index].mesh().surface_nodes());
+            let again = body.improve(surfaces[index].mesh().surface_nodes(), is_changing);
             changed.fetch_add(usize::from(again), Ordering::Relaxed);
         });
         self.surfaces = surfaces;

@@ -8,8 +8,9 @@ mod stack;
 use std::sync::Arc;
 
 use palpate::cutting::{Blade, CutOptions, cut_on};
-use palpate::model::{Body, Law};
-use palpate::{ChangeReport, Model, Simulation, SimulationOptions};
+use palpate::model::{Body, Law, RigidMotion};
+use palpate::{ChangeReport, Mesh, MeshData, Model, Simulation, SimulationOptions};
+use palpate_testing::{Fastest, box_of_cells};
 use stack::{bits, blade, model, run, soft_box, start};
 
 fn cut_live(simulation: &mut Simulation, blade: &Blade, delay: u32) {
@@ -237,4 +238,41 @@ fn what_cannot_be_is_refused() {
     assert!(error.contains("snap is 0.7"), "{error}");
     assert!(!simulation.has_live_cuts());
     assert_eq!(bits(&simulation), before);
+}
+
+/// New matrices of a bar that is thrown onto a post while `stroke` gives strokes of a step.
+fn matrices_of_a_thrown_bar(stroke: impl Fn(usize) -> Option<(Blade, u32)>) -> usize {
+    let place = |[x, y, z]: [f64; 3]| [0.033 * x - 0.1, 0.01 * y, 0.01 * z + 0.025];
+    let (nodes, tetrahedra) = box_of_cells([6, 2, 2], Fastest::First, place);
+    let data = MeshData { nodes, tetrahedra, ..MeshData::default() };
+    let mut bar = Body::new("bar", Arc::new(Mesh::new(data).unwrap()));
+    bar.material.law = Law::NeoHookean;
+    (bar.material.young, bar.material.poisson) = (1e5, 0.45);
+    bar.initial_velocity = [0.0, 0.0, -1.0];
+    let mut post = Body::new("post", soft_box([2, 2, 1], 0.02, [-0.02, -0.01, 0.0]));
+    post.rigid = Some(RigidMotion::default());
+    let model = Model::from_bodies(vec![post, bar]);
+    let mut simulation = Simulation::new(model, SimulationOptions::default()).unwrap();
+    let mut made = 0;
+    for step in 0..40 {
+        if let Some((blade, delay)) = stroke(step) {
+            cut_live(&mut simulation, &blade, delay);
+        }
+        made += simulation.step().unwrap().mechanics.refactored;
+    }
+    made
+}
+
+#[test]
+fn a_body_that_may_be_cut_soon_makes_no_matrix_unless_strokes_pass_it_by() {
+    // Round the bar at a distance: it may be cut until they open nothing.
+    let edge = |x: f64, y: f64| [[x, y, -1.0], [x, y, 1.0]];
+    let by = Blade::stroke(&[edge(-1.0, -0.2), edge(1.0, -0.2), edge(1.0, 0.5)]).unwrap();
+    let own = matrices_of_a_thrown_bar(|_| None);
+    let once = matrices_of_a_thrown_bar(|step| (step % 8 == 0).then(|| (by.clone(), 8)));
+    let often = matrices_of_a_thrown_bar(|_| Some((by.clone(), 2)));
+    let late = matrices_of_a_thrown_bar(|step| (step == 0).then(|| (by.clone(), 60)));
+    assert!(own > once, "it waits: {own} {once}");
+    assert!(0 < often && often <= own, "every other step it does not: {own} {often}");
+    assert_eq!(late, own, "it does not wait for what is far away");
 }

@@ -94,8 +94,15 @@ impl Dynamics {
         body.elastic().map_or_else(Vec::new, |elastic| elastic.next_stiff_shape(&body.positions))
     }
 
+    /// Whether another matrix of body `index` is being made: until then a step that takes many iterations
+    /// makes none, which would not serve for long.
+    pub fn await_matrix(&mut self, index: usize, awaited: bool) {
+        self.body_mut(index).waits_for_matrix = awaited;
+    }
+
     /// Goes on with a body that was made for `change`, as [`Self::change_body`]: all but the time that the
-    /// matrix and the responses take.
+    /// matrix and the responses take. The step that has to begin now leaves what one pass does not settle, up to
+    /// half an edge, to the next one.
     ///
     /// # Panics
     /// If the model has another number of bodies, or the change is not one of the body's mesh.
@@ -105,6 +112,7 @@ impl Dynamics {
         model: &Model,
         change: &MeshChange,
     ) -> Vec<u64> {
+        self.is_changing = true;
         self.replace_body(changed, model, change).0
     }
 

@@ -108,6 +108,32 @@ fn momentum_is_kept_by_copies_and_by_nodes_in_between() {
 }
 
 #[test]
+fn a_prepared_change_is_the_change_and_its_step_is_settled_by_one_pass() {
+    let mut model = thrown(Law::NeoHookean);
+    model.bodies[0].initial_velocity = [0.2, 0.1, -1.5];
+    let change = opened(&model.bodies[0].mesh);
+    let mut fewer = 0;
+    for step in 0..14 {
+        let mut at_once = World::new(&model, STEP, 1);
+        at_once.run(step);
+        let mut prepared = World::new(&model, STEP, 1);
+        prepared.run(step);
+        at_once.change(&model, 0, &change);
+        prepared.change_prepared(&model, 0, &change);
+        assert_eq!(prepared.dynamics.positions(0), at_once.dynamics.positions(0));
+        assert_eq!(prepared.dynamics.velocities(0), at_once.dynamics.velocities(0));
+        let solves = [&mut at_once, &mut prepared].map(|world| world.step().contact_solves);
+        assert!(solves[1] <= solves[0]);
+        let same = prepared.dynamics.positions(0) == at_once.dynamics.positions(0);
+        assert_eq!(same, solves[0] == solves[1], "{step}: {solves:?}");
+        fewer += usize::from(solves[1] < solves[0]);
+        let apart = largest_distance(at_once.dynamics.positions(0), prepared.dynamics.positions(0));
+        assert!(apart < 0.1 * 0.02, "less than a tenth of an edge: {apart}");
+    }
+    assert!(fewer > 0, "what comes to the floor takes two passes");
+}
+
+#[test]
 fn it_goes_on_like_a_body_made_of_the_new_mesh() {
     for law in [Law::Linear, Law::NeoHookean] {
         let model = thrown(law);

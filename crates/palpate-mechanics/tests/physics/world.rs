@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use palpate_contact::{IntersectionOptions, PenetratingNode, ProximityPair, Scene, SceneOptions};
 use palpate_geometry::Point;
-use palpate_mechanics::{Dynamics, DynamicsOptions, State, StepStats};
+use palpate_mechanics::{ChangedBody, Dynamics, DynamicsOptions, State, StepStats};
 use palpate_model::{Body, Material, Mesh, MeshChange, MeshData, Model, RigidMotion};
 use palpate_testing::{Fastest, box_of_cells};
 
@@ -61,6 +61,16 @@ impl World {
         self.dynamics.change_body(&after, index, change).unwrap();
         self.scene.change_body(index, change).unwrap();
         after
+    }
+
+    /// The same with what takes the time made before.
+    pub(crate) fn change_prepared(&mut self, model: &Model, index: usize, change: &MeshChange) {
+        let after = model.changed(index, change);
+        let basis = self.dynamics.basis(index);
+        let time_step = self.dynamics.options().time_step;
+        let made = ChangedBody::new(&after, index, change, &basis, time_step).unwrap();
+        self.dynamics.go_on_with(made.prepared(&basis, change), &after, change);
+        self.scene.change_body(index, change).unwrap();
     }
 
     /// A world of the model after cuts, in a state of another one.

@@ -20,6 +20,9 @@ use serde::{Deserialize, Serialize};
 use super::{BodyChange, ChangeReport, ChangeTimes, PendingFaces, Simulation, SimulationError};
 use crate::scene_cuts::{BodyToCut, cut_bodies};
 
+/// Steps before a cut opens from which on the bodies that it may reach wait for the matrices that it brings.
+const AWAITED: u64 = 8;
+
 /// What live cuts need from one step to the next, threads apart.
 #[derive(Clone, Debug, Default, Deserialize, Serialize)]
 pub(crate) struct LiveCuts {
@@ -55,6 +58,8 @@ pub(super) struct LiveWork {
     /// `None` where no thread does it: it is done when it is due.
     thread: Option<JoinHandle<Result<Opening, SimulationError>>>,
     opened: Option<ChangeReport>,
+    /// Bodies that changed before the step that begins; `None` where nothing was to open.
+    changed: Option<Vec<usize>>,
 }
 
 /// Everything that the preparation of a cut depends on.
@@ -135,6 +140,7 @@ impl Simulation {
 
     /// Opens what is due before the next step, and begins what waits.
     pub(super) fn open_and_begin(&mut self) -> Result<(), SimulationError> {
+        self.live_work.changed = None;
         self.open_due()?;
         if self.live.begun.is_none() && !self.live.waiting.is_empty() {
             let strokes = std::mem::take(&mut self.live.waiting);
@@ -147,7 +153,22 @@ impl Simulation {
             }
             self.open_due()?;
         }
+        self.await_matrices();
         Ok(())
+    }
+
+    /// Has bodies that will soon be cut keep their matrices until then: one that a step makes would serve
+    /// for as few steps. Those that the last strokes passed by after all make theirs in between.
+    fn await_matrices(&mut self) {
+        let step = self.dynamics.step_count();
+        let begun =
+            self.live.begun.as_ref().filter(|begun| begun.due.saturating_sub(step) <= AWAITED);
+        let changed = &self.live_work.changed;
+        for body in 0..self.model.bodies.len() {
+            let reached = begun.is_some_and(|begun| begun.reaches(body));
+            let passed_by = changed.as_ref().is_some_and(|changed| !changed.contains(&body));
+            self.dynamics.await_matrix(body, reached && !passed_by);
+        }
     }
 
     /// What opened before the step that has just been taken.
@@ -237,6 +258,7 @@ impl Simulation {
     fn open(&mut self, opening: Opening) -> Result<(), SimulationError> {
         let Opening { bodies, pending, mut times } = opening;
         let mut report = ChangeReport::default();
+        self.live_work.changed = Some(bodies.iter().map(|body| body.change.body).collect());
         for OpenedBody { mut change, made, surface, model } in bodies {
             let begin = Instant::now();
             change.released = self.dynamics.go_on_with(made, &model, &change.change);

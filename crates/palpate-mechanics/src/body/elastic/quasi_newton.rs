@@ -28,6 +28,9 @@ const MAX_ITERATIONS: usize = 10;
 const MAX_HELD_ITERATIONS: usize = 1;
 /// Moves smaller than this, in mean edges, are not worth another solve for the contact forces.
 const SETTLED: f64 = 0.1;
+/// The same while a cut changes the body, or a matrix that it brings is being made. The lips jump apart, and with a
+/// matrix that says too little of this shape passes go too far one after the other: the next steps do as well.
+const SETTLED_IN_CHANGE: f64 = 0.5;
 /// Iterations of a step, or solves for its contact forces, after which A is made anew.
 const SLOW: u32 = 6;
 /// The same when a node has moved by more than this part of the body's radius since, apart from the
@@ -72,8 +75,9 @@ pub(super) struct QuasiNewton {
     /// any of them.
     passes: u32,
     effort: u32,
-    /// Longest move of the last iteration [m].
+    /// Longest move of the last iteration [m], and what was left of it where it went too far.
     longest: f64,
+    left: f64,
 }
 
 /// A stiffness, and the mesh that it is of.
@@ -120,6 +124,7 @@ impl QuasiNewton {
             passes: 0,
             effort: 0,
             longest: 0.0,
+            left: 0.0,
         }
     }
 
@@ -244,10 +249,13 @@ impl ElasticBody {
     /// Makes A of the stiffness at positions `x` if the step that ends there took many iterations or the
     /// shape has changed much: with the stiffness of a very different shape the contact forces, which A
     /// alone tells how to choose, would be wrong as well. True if A has changed.
-    pub(in crate::body) fn refresh_if_slow(&mut self, x: &[Point]) -> bool {
+    ///
+    /// Where another matrix `is_coming`, only a shape that has changed much is worth one until then.
+    pub(in crate::body) fn refresh_if_slow(&mut self, x: &[Point], is_coming: bool) -> bool {
         match std::mem::take(&mut self.elasticity) {
             Elasticity::Nonlinear(mut method) => {
-                let due = method.effort >= SLOW || self.change_of_shape(&method, x) > DEFORMED;
+                let slow = method.effort >= SLOW && !is_coming;
+                let due = slow || self.change_of_shape(&method, x) > DEFORMED;
                 let changed = due && {
                     method.x.clear();
                     method.x.extend(self.arms_of(x).map(|arm| arm.to_array()));
@@ -360,7 +368,7 @@ impl ElasticBody {
             let longest = self.next_move(method);
             method.iterations += 1;
             method.effort = method.effort.max(iteration as u32 + 1);
-            method.longest = longest;
+            (method.longest, method.left) = (longest, longest);
             self.make_move(method, longest);
             if longest <= TOLERANCE * method.mean_edge {
                 break;
@@ -391,6 +399,7 @@ impl ElasticBody {
             method.effort = method.effort.max(SLOW);
             // Where the residual along the move vanishes if it changes in proportion.
             let part = (before / (before - after)).max(SHORTEST);
+            method.left *= part;
             for (d, s) in self.step.correction.iter_mut().zip(&mut method.pairs[known].s) {
                 *d = std::array::from_fn(|k| d[k] - (1.0 - part) * s[k]);
                 *s = s.map(|s| part * s);
@@ -411,16 +420,19 @@ impl ElasticBody {
     }
 
     /// Some more iterations, now that the response to other contact forces is known: false if there is
-    /// nothing to gain. The contact forces are expected from now on, and the response is zero.
+    /// nothing to gain, or too little while the body `is_changing`. The contact forces are expected from now on, and the response is zero.
     pub(super) fn iterate(
         &mut self,
         method: &mut QuasiNewton,
         x: &[Point],
         forces: &[Point],
         contact: &[Point],
+        is_changing: bool,
     ) -> bool {
-        let enough = SETTLED * method.mean_edge;
-        let moved = method.longest.max(self.step.farthest_response(&self.masses));
+        let (settled, last) =
+            if is_changing { (SETTLED_IN_CHANGE, method.left) } else { (SETTLED, method.longest) };
+        let enough = settled * method.mean_edge;
+        let moved = last.max(self.step.farthest_response(&self.masses));
         if moved <= enough {
             return false;
         }

@@ -344,17 +344,19 @@ impl ElasticBody {
         self.step.response = response;
     }
 
-    /// Improves the step under contact forces that are not those that it was predicted with; true if
-    /// it has changed, so that contact must be solved again from the new [`Self::end_positions`].
+    /// Improves the step under contact forces that are not those that it was predicted with, unless it has
+    /// settled, while it `is_changing` more or less; true if it has changed, so that contact must be solved again
+    /// from the new [`Self::end_positions`].
     pub(in crate::body) fn improve(
         &mut self,
         x: &[Point],
         forces: &[Point],
         contact: &[Point],
+        is_changing: bool,
     ) -> bool {
         let mut elasticity = std::mem::take(&mut self.elasticity);
         let changed = match &mut elasticity {
-            Elasticity::Nonlinear(method) => self.iterate(method, x, forces, contact),
+            Elasticity::Nonlinear(method) => self.iterate(method, x, forces, contact, is_changing),
             _ => false,
         };
         self.elasticity = elasticity;
