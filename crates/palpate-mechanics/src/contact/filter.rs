@@ -197,6 +197,9 @@ impl Filter {
             PairKind::VertexTriangle => self.vertex_triangle(pair, bodies),
             PairKind::EdgeEdge => edge_edge(pair, bodies, is_loaded(pair)),
         }?;
+        if pair.bodies[0] == pair.bodies[1] && is_inside_out(pair, &bodies[0]) {
+            return None;
+        }
         let area = match pair.kind {
             PairKind::VertexTriangle => bodies[0].surface.node_area(pair.nodes[0]),
             PairKind::EdgeEdge => {
@@ -356,6 +359,25 @@ fn are_lips(pair: &ProximityPair, body: &BodyView<'_>) -> bool {
     }
 }
 
+/// Whether the tissue at a pair of one body is turned inside out: there its surface lies folded over itself
+/// on the wrong side, and contacts would hold it so.
+fn is_inside_out(pair: &ProximityPair, body: &BodyView<'_>) -> bool {
+    let mesh = body.surface.mesh();
+    let is_turned = |triangle: u32| {
+        let Some(&owner) = mesh.triangle_owners().get(triangle as usize) else { return false };
+        let [a, b, c, d] = mesh.tetrahedra()[owner as usize].map(|node| body.at(node));
+        (b - a).cross(c - a).dot(d - a) <= 0.0
+    };
+    let at_edge = |edge: u32| body.surface.edge_triangles(edge).iter().any(|&(t, _)| is_turned(t));
+    let [a, b] = pair.elements;
+    match pair.kind {
+        PairKind::VertexTriangle => {
+            is_turned(b) || body.surface.node_triangles(a).iter().any(|&t| is_turned(t))
+        }
+        PairKind::EdgeEdge => at_edge(a) || at_edge(b),
+    }
+}
+
 /// Gap and normal of an edge against an edge, if the pair is a contact.
 fn edge_edge(
     pair: &ProximityPair,
@@ -501,5 +523,52 @@ mod tests {
         assert!(edges_touch(0.2, false) && edges_touch(0.2, true));
         assert!(!edges_touch(0.1, false) && edges_touch(0.1, true));
         assert!(!edges_touch(0.02, false) && !edges_touch(0.02, true));
+    }
+
+    /// How many contacts there are where the tip of one tetrahedron of a body is just above another one,
+    /// its other nodes `height` above the tip.
+    fn own_contacts(height: f64) -> usize {
+        let below = [[0.0, 0.0, -1.0], [1.0, 0.0, 0.0], [-1.0, 1.0, 0.0], [-1.0, -1.0, 0.0]];
+        let above = |tip: f64| {
+            let top = tip + height;
+            [[0.0, 0.0, tip], [1.0, 0.0, top], [-1.0, 1.0, top], [-1.0, -1.0, top]]
+        };
+        let upright = [[0.0, 0.0, 9.0], [1.0, 0.0, 10.0], [-1.0, 1.0, 10.0], [-1.0, -1.0, 10.0]];
+        let data = MeshData {
+            nodes: [below, upright].concat(),
+            tetrahedra: vec![[0, 1, 2, 3], [4, 5, 6, 7]],
+            ..MeshData::default()
+        };
+        let body = Body::new("two", Arc::new(Mesh::new(data).unwrap()));
+        let surface = Surface::new(&body.mesh);
+        let parameters = ContactParameters::new(0, &body).unwrap();
+        let positions = [below, above(0.01)].concat();
+        let facing = |corners: &[u32; 3]| corners.iter().all(|corner| (1..4).contains(corner));
+        let triangle = body.mesh.triangles().iter().position(facing).unwrap();
+        let [a, b, c] = body.mesh.triangles()[triangle];
+        // The tip is above the middle of the triangle's nodes 1, 2 and 3, at (0, 0, 0).
+        let weight = |node: u32| if node == 1 { -0.5 } else { -0.25 };
+        let pair = ProximityPair {
+            kind: PairKind::VertexTriangle,
+            bodies: [0, 0],
+            elements: [4, triangle as u32],
+            nodes: [4, a, b, c],
+            weights: [1.0, weight(a), weight(b), weight(c)],
+            normal: [0.0, 0.0, 1.0],
+            distance: 0.01,
+        };
+        let view =
+            |_| BodyView { surface: &surface, parameters: &parameters, positions: &positions };
+        let detected = Detected { proximity: &[pair], penetration: &[] };
+        let mut candidates = Vec::new();
+        Filter::default().run(detected, view, |_| false, 0.01, None, &mut candidates);
+        candidates.len()
+    }
+
+    #[test]
+    fn a_body_does_not_push_itself_where_it_is_inside_out() {
+        assert_eq!(own_contacts(1.0), 1);
+        assert_eq!(own_contacts(0.0), 0);
+        assert_eq!(own_contacts(-0.005), 0);
     }
 }
