@@ -73,7 +73,7 @@ fn is_first(body: &SceneBody, triangle: u32, weights: [f64; 3]) -> bool {
     match (on.next(), on.next(), on.next()) {
         (Some(corner), None, _) => {
             let node = body.mesh.triangles()[triangle as usize][corner];
-            body.surface.triangles_of_nodes.around(node)[0] == triangle
+            body.surface.triangles_of_nodes.of(node)[0] == triangle
         }
         (Some(first), Some(second), None) => {
             // Edge i joins corners i and i + 1.

@@ -3,8 +3,8 @@
 
 use std::sync::OnceLock;
 
-use palpate_model::Mesh;
-use palpate_model::mesh::{NONE, NodeTriangles};
+use palpate_model::mesh::NONE;
+use palpate_model::{Lists, Mesh};
 
 /// Fixed facts of a surface.
 ///
@@ -23,40 +23,8 @@ pub(crate) struct Surface {
     /// One node of each connected part: the smallest.
     pub(crate) component_nodes: Vec<u32>,
     /// The surface triangles around each node.
-    pub(crate) triangles_of_nodes: NodeTriangles,
-    tetrahedra_of_nodes: OnceLock<NodeTetrahedra>,
-}
-
-/// The tetrahedra around each node, in compressed rows.
-#[derive(Clone, Debug)]
-pub(crate) struct NodeTetrahedra {
-    offsets: Vec<u32>,
-    tetrahedra: Vec<u32>,
-}
-
-impl NodeTetrahedra {
-    fn new(mesh: &Mesh) -> Self {
-        let mut offsets = vec![0_u32; mesh.nodes().len() + 1];
-        for &node in mesh.tetrahedra().as_flattened() {
-            offsets[node as usize + 1] += 1;
-        }
-        for node in 0..mesh.nodes().len() {
-            offsets[node + 1] += offsets[node];
-        }
-        let mut next = offsets.clone();
-        let mut tetrahedra = vec![0; 4 * mesh.tetrahedra().len()];
-        for (corner, &node) in mesh.tetrahedra().as_flattened().iter().enumerate() {
-            let slot = &mut next[node as usize];
-            tetrahedra[*slot as usize] = corner as u32 / 4;
-            *slot += 1;
-        }
-        Self { offsets, tetrahedra }
-    }
-
-    pub(crate) fn around(&self, node: u32) -> &[u32] {
-        let range = self.offsets[node as usize] as usize..self.offsets[node as usize + 1] as usize;
-        &self.tetrahedra[range]
-    }
+    pub(crate) triangles_of_nodes: Lists<u32>,
+    tetrahedra_of_nodes: OnceLock<Lists<u32>>,
 }
 
 impl Surface {
@@ -94,8 +62,8 @@ impl Surface {
     }
 
     /// The tetrahedra around each node of `mesh`, the surface's own; made when first asked for.
-    pub(crate) fn tetrahedra_of_nodes(&self, mesh: &Mesh) -> &NodeTetrahedra {
-        self.tetrahedra_of_nodes.get_or_init(|| NodeTetrahedra::new(mesh))
+    pub(crate) fn tetrahedra_of_nodes(&self, mesh: &Mesh) -> &Lists<u32> {
+        self.tetrahedra_of_nodes.get_or_init(|| mesh.node_tetrahedra())
     }
 }
 

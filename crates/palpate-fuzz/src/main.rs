@@ -8,7 +8,6 @@
 
 mod choices;
 mod mutate;
-mod random;
 mod run;
 mod shown;
 mod targets;

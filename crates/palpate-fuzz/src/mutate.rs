@@ -1,6 +1,6 @@
 //! Other inputs out of known ones.
 
-use crate::random::Random;
+use palpate_testing::Random;
 
 /// Longest input that is made.
 const LONGEST: usize = 20_000;

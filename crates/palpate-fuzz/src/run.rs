@@ -6,10 +6,9 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use palpate_testing::peak_of;
+use palpate_testing::{Random, peak_of};
 
 use crate::mutate::mutated;
-use crate::random::Random;
 use crate::targets::Target;
 use crate::watchdog::{Watchdog, computed};
 
@@ -129,7 +128,7 @@ impl Fuzzer {
         tell: &mut dyn FnMut(&str),
     ) -> usize {
         let start = Instant::now();
-        let mut random = Random::new(seed);
+        let mut random = Random(seed);
         let corpus = self.pool.clone();
         for input in corpus {
             self.look_at(&input, seed, tell);

@@ -3,6 +3,7 @@
 pub mod body;
 pub mod files;
 pub mod language;
+mod lists;
 pub mod mesh;
 mod number;
 
@@ -18,7 +19,8 @@ pub use files::{
 pub use language::{
     CoreLoader, Diagnostic, Document, LoadError, MeshLoader, ModelError, load_model,
 };
+pub use lists::Lists;
 pub use mesh::{
     Defect, DefectKind, ElementKind, FIBRE_FAMILIES, Indices, Mesh, MeshChange, MeshData,
-    MeshError, NONE, NodeOrigin, NodeTriangles, QualitySummary, RepairReport, TETRAHEDRON_FACES,
+    MeshError, NONE, NodeOrigin, QualitySummary, RepairReport, TETRAHEDRON_FACES,
 };

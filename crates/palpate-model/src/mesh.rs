@@ -14,7 +14,6 @@ use glam::DVec3;
 use palpate_geometry::{Aabb, Point};
 use serde::{Deserialize, Serialize, Serializer};
 
-pub use adjacency::NodeTriangles;
 pub use change::{MeshChange, NodeOrigin};
 pub use check::RepairReport;
 pub use defects::{Defect, DefectKind};

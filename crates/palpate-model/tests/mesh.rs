@@ -31,7 +31,7 @@ fn one_tetrahedron_has_four_outward_triangles_and_six_edges() {
     assert_eq!(mesh.surface_nodes(), [0, 1, 2, 3]);
     assert_eq!(mesh.volume(), 1.0 / 6.0);
     assert_eq!(mesh.tetrahedron_neighbors(), [[NONE; 4]]);
-    assert_eq!(mesh.node_triangles().around(3), [1, 2, 3]);
+    assert_eq!(mesh.node_triangles().of(3), [1, 2, 3]);
     assert!(mesh.validate().is_empty());
 }
 

@@ -53,6 +53,13 @@ pub fn box_of_cells(
     (nodes, tetrahedra)
 }
 
+/// Nodes and triangles of a rectangle of two triangles at height `z`, facing up.
+pub fn rectangle(low: [f64; 2], high: [f64; 2], z: f64) -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
+    let ([x0, y0], [x1, y1]) = (low, high);
+    let nodes = vec![[x0, y0, z], [x1, y0, z], [x1, y1, z], [x0, y1, z]];
+    (nodes, vec![[0, 1, 2], [0, 2, 3]])
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -3,6 +3,8 @@
 
 mod boxes;
 mod counting_allocator;
+mod random;
 
-pub use boxes::{Fastest, box_of_cells};
+pub use boxes::{Fastest, box_of_cells, rectangle};
 pub use counting_allocator::{Counting, allocations, bytes_in_use, peak_of};
+pub use random::Random;

@@ -18,6 +18,7 @@ use palpate::cutting::{Blade, CutOptions, cut};
 use palpate::geometry::Point;
 use palpate::model::{Body, Law, RigidMotion};
 use palpate::{Mesh, MeshData, Model, Scene, SceneOptions, Simulation, SimulationOptions};
+use palpate_testing::rectangle;
 
 const THREADS: [usize; 5] = [1, 2, 3, 8, 16];
 
@@ -124,11 +125,8 @@ fn cuts() -> u64 {
 
 /// Boxes of one law on a plate, pulled, driven and cut.
 fn simulation(law: Law, threads: usize) -> u64 {
-    let plate = MeshData {
-        nodes: vec![[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]],
-        triangles: vec![[0, 1, 2], [0, 2, 3]],
-        ..MeshData::default()
-    };
+    let (nodes, triangles) = rectangle([-1.0; 2], [1.0; 2], 0.0);
+    let plate = MeshData { nodes, triangles, ..MeshData::default() };
     let mut plate = Body::new("plate", Arc::new(Mesh::new(plate).unwrap()));
     plate.rigid = Some(RigidMotion::default());
     let mut bodies = vec![

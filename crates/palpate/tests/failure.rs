@@ -10,15 +10,13 @@ use glam::DQuat;
 use palpate::mechanics::{Cause, State};
 use palpate::model::{Body, Law, Material, RigidMotion};
 use palpate::{Mesh, MeshData, Model, Simulation, SimulationError, SimulationOptions, Substeps};
+use palpate_testing::rectangle;
 
 const TOOL: usize = 1;
 
 fn plate(z: f64) -> Body {
-    let data = MeshData {
-        nodes: vec![[-0.1, -0.1, z], [0.2, -0.1, z], [0.2, 0.2, z], [-0.1, 0.2, z]],
-        triangles: vec![[0, 1, 2], [0, 2, 3]],
-        ..MeshData::default()
-    };
+    let (nodes, triangles) = rectangle([-0.1; 2], [0.2; 2], z);
+    let data = MeshData { nodes, triangles, ..MeshData::default() };
     let mut plate = Body::new("plate", Arc::new(Mesh::new(data).expect("a plate is a mesh")));
     plate.rigid = Some(RigidMotion::default());
     plate

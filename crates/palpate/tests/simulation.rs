@@ -8,17 +8,15 @@ use std::sync::Arc;
 use boxes::box_data;
 use palpate::model::{Body, RigidMotion};
 use palpate::{CheckpointError, Mesh, MeshData, Model, Simulation, SimulationOptions};
+use palpate_testing::rectangle;
 
 fn soft_box(cells: [usize; 3], h: f64, origin: [f64; 3]) -> Mesh {
     Mesh::repaired(box_data(cells, h, origin)).expect("a box is a mesh").0
 }
 
 fn falling_boxes() -> Model {
-    let plate = MeshData {
-        nodes: vec![[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]],
-        triangles: vec![[0, 1, 2], [0, 2, 3]],
-        ..MeshData::default()
-    };
+    let (nodes, triangles) = rectangle([-1.0; 2], [1.0; 2], 0.0);
+    let plate = MeshData { nodes, triangles, ..MeshData::default() };
     let mut plate = Body::new("plate", Arc::new(Mesh::new(plate).expect("a plate is a mesh")));
     plate.rigid = Some(RigidMotion::default());
     let lower = soft_box([3, 3, 2], 0.03, [0.0, 0.0, 0.01]);

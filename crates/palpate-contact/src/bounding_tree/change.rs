@@ -1,7 +1,7 @@
 //! The tree after a change of topology: the same nodes, other members.
 
 use palpate_geometry::Aabb;
-use palpate_model::MeshChange;
+use palpate_model::{Lists, MeshChange};
 
 use super::BoundingTree;
 use super::build::Elements;
@@ -16,26 +16,13 @@ impl BoundingTree {
     /// If the tree is not that of the mesh before.
     pub(crate) fn change(&mut self, change: &MeshChange) {
         let count = self.element_order.len();
-        let mut first_child = vec![0_u32; count + 1];
-        for &parent in &change.tetrahedra {
-            first_child[parent as usize + 1] += 1;
-        }
-        for parent in 0..count {
-            first_child[parent + 1] += first_child[parent];
-        }
-        let mut children = vec![0; change.tetrahedra.len()];
-        let mut next = first_child.clone();
-        for (element, &parent) in change.tetrahedra.iter().enumerate() {
-            let place = &mut next[parent as usize];
-            children[*place as usize] = element as u32;
-            *place += 1;
-        }
+        let parents = change.tetrahedra.iter().copied();
+        let children = Lists::new(count, parents.zip(0_u32..));
         let mut starts = Vec::with_capacity(count + 1);
-        let mut order = Vec::with_capacity(children.len());
+        let mut order = Vec::with_capacity(change.tetrahedra.len());
         for &element in &self.element_order {
-            let [from, to] = [element, element + 1].map(|e| first_child[e as usize] as usize);
             starts.push(order.len() as u32);
-            order.extend_from_slice(&children[from..to]);
+            order.extend_from_slice(children.of(element));
         }
         starts.push(order.len() as u32);
         self.element_order = order;

@@ -1,6 +1,6 @@
 //! Surface elements of a common group.
 
-use palpate_model::{Mesh, MeshChange};
+use palpate_model::{Lists, Mesh, MeshChange};
 
 use super::{Elements, Filter};
 use crate::scene::{Scene, SceneError};
@@ -39,8 +39,8 @@ impl Filter for Groups {
         let (Some(a), Some(b)) = (self.of(a), self.of(b)) else { return false };
         let [of_a, of_b] = match elements {
             Elements::Triangles([i, j]) => [a.of_triangle(i), b.of_triangle(j)],
-            Elements::NodeAndTriangle([i, j]) => [a.nodes.row(i), b.of_triangle(j)],
-            Elements::Edges([i, j]) => [a.edges.row(i), b.edges.row(j)],
+            Elements::NodeAndTriangle([i, j]) => [a.nodes.of(i), b.of_triangle(j)],
+            Elements::Edges([i, j]) => [a.edges.of(i), b.edges.of(j)],
         };
         of_a.iter().any(|group| of_b.contains(group))
     }
@@ -91,8 +91,8 @@ impl Scene {
 #[derive(Clone, Debug)]
 struct OfBody {
     triangles: Vec<u32>,
-    nodes: Rows,
-    edges: Rows,
+    nodes: Lists<u32>,
+    edges: Lists<u32>,
 }
 
 impl OfBody {
@@ -104,7 +104,10 @@ impl OfBody {
         let around = |corners: &[[u32; 3]], count: usize| {
             let in_group = corners.iter().zip(&triangles).filter(|(_, group)| **group != 0);
             let pairs = in_group.flat_map(|(corners, &group)| corners.map(|index| (index, group)));
-            Rows::new(pairs.collect(), count)
+            let mut pairs: Vec<(u32, u32)> = pairs.collect();
+            pairs.sort_unstable();
+            pairs.dedup();
+            Lists::new(count, pairs.into_iter())
         };
         let nodes = around(mesh.triangles(), mesh.nodes().len());
         let edges = around(mesh.triangle_edges(), mesh.surface_edges().len());
@@ -114,28 +117,6 @@ impl OfBody {
     fn of_triangle(&self, triangle: u32) -> &[u32] {
         let group = &self.triangles[triangle as usize];
         if *group == 0 { &[] } else { std::slice::from_ref(group) }
-    }
-}
-
-/// The groups of each element of some kind.
-#[derive(Clone, Debug)]
-struct Rows {
-    starts: Vec<u32>,
-    groups: Vec<u32>,
-}
-
-impl Rows {
-    fn new(mut pairs: Vec<(u32, u32)>, count: usize) -> Self {
-        pairs.sort_unstable();
-        pairs.dedup();
-        let start = |element: u32| pairs.partition_point(|pair| pair.0 < element) as u32;
-        let starts = (0..=count as u32).map(start).collect();
-        Self { starts, groups: pairs.into_iter().map(|pair| pair.1).collect() }
-    }
-
-    fn row(&self, element: u32) -> &[u32] {
-        let [start, end] = [self.starts[element as usize], self.starts[element as usize + 1]];
-        &self.groups[start as usize..end as usize]
     }
 }
 

@@ -61,7 +61,7 @@ impl Exits {
     fn through_patch(&mut self, node: &Node, patch: &Inside) -> Option<Closest> {
         let body = &node.search.surfaces.bodies[node.body as usize];
         self.normals.clear();
-        for &triangle in body.surface.triangles_of_nodes.around(node.index) {
+        for &triangle in body.surface.triangles_of_nodes.of(node.index) {
             self.normals.extend(unit(triangle_normal(&body.triangle(triangle))));
         }
         let opposite = |triangle: u32, corners: &[Point; 3], found: &PointTriangle, faces: bool| {

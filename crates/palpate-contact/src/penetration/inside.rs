@@ -109,7 +109,7 @@ impl Inside {
             if side == Side::Inside {
                 self.nodes.push(node);
             }
-            for &triangle in body.surface.triangles_of_nodes.around(node) {
+            for &triangle in body.surface.triangles_of_nodes.of(node) {
                 if self.crosses[triangle as usize] {
                     continue;
                 }
@@ -131,7 +131,7 @@ impl Inside {
         self.patch.extend_from_slice(&self.crosses);
         let swallowed = self.swallowed.iter().map(|&(_, node)| node);
         for node in self.nodes.iter().copied().chain(swallowed) {
-            for &triangle in body.surface.triangles_of_nodes.around(node) {
+            for &triangle in body.surface.triangles_of_nodes.of(node) {
                 self.patch[triangle as usize] = true;
             }
         }

@@ -51,7 +51,7 @@ impl Surfaces<'_> {
         let Some(mut covering) = self.winding(body, point, is_other) else {
             return Some(false);
         };
-        for &tetrahedron in surface.tetrahedra_of_nodes(mesh).around(node) {
+        for &tetrahedron in surface.tetrahedra_of_nodes(mesh).of(node) {
             let nodes = mesh.tetrahedra()[tetrahedron as usize];
             let [a, b, c, d] = nodes.map(|node| positions[node as usize]);
             if orientation(&[a, b, c, d]) <= 0 {

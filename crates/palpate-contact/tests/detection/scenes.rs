@@ -3,32 +3,11 @@
 use std::sync::Arc;
 
 use palpate_model::{Mesh, MeshData};
+pub(crate) use palpate_testing::Random;
 use palpate_testing::{Fastest, box_of_cells};
 
 pub(crate) type Point = [f64; 3];
 pub(crate) type Positions = Vec<Vec<Point>>;
-
-/// Pseudo-random numbers (SplitMix64): the same scenes everywhere.
-pub(crate) struct Random(pub(crate) u64);
-
-impl Random {
-    pub(crate) fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    /// Uniform in [low, high).
-    pub(crate) fn between(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * (self.bits() >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    pub(crate) fn vector(&mut self, size: f64) -> Point {
-        std::array::from_fn(|_| self.between(-size, size))
-    }
-}
 
 /// Data of a block of unit cells from the origin, its nodes moved by `map`.
 pub(crate) fn block_data(cells: [usize; 3], map: impl Fn(Point) -> Point) -> MeshData {

@@ -28,7 +28,7 @@ impl Target for SceneCalls {
     }
 
     fn seeds(&self) -> Vec<Vec<u8>> {
-        let mut random = crate::random::Random::new(0);
+        let mut random = palpate_testing::Random(0);
         (0..20).map(|_| (0..400).map(|_| random.bits() as u8).collect()).collect()
     }
 

@@ -1,7 +1,7 @@
 //! Meshes to play with.
 
 use palpate::{Mesh, MeshData};
-use palpate_testing::{Fastest, box_of_cells};
+use palpate_testing::{Fastest, box_of_cells, rectangle};
 
 /// A box of cells (i, j, k) of edge `h`, six tetrahedra each; nodes of the lowest layer are the set
 /// `base`, and layers along x regions 0 and 1 by turns.
@@ -17,12 +17,6 @@ pub(crate) fn box_of(cells: [usize; 3], h: f64, origin: [f64; 3]) -> Mesh {
 
 /// A square of two triangles.
 pub(crate) fn plate(size: f64, height: f64) -> Mesh {
-    let [low, high] = [-size, size];
-    let corners = [[low, low], [high, low], [high, high], [low, high]];
-    Mesh::new(MeshData {
-        nodes: corners.map(|[x, y]| [x, y, height]).to_vec(),
-        triangles: vec![[0, 1, 2], [0, 2, 3]],
-        ..MeshData::default()
-    })
-    .expect("a plate is a mesh")
+    let (nodes, triangles) = rectangle([-size; 2], [size; 2], height);
+    Mesh::new(MeshData { nodes, triangles, ..MeshData::default() }).expect("a plate is a mesh")
 }

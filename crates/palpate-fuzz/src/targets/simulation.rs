@@ -29,7 +29,7 @@ impl Target for SimulationCalls {
     }
 
     fn seeds(&self) -> Vec<Vec<u8>> {
-        let mut random = crate::random::Random::new(1);
+        let mut random = palpate_testing::Random(1);
         (0..20).map(|_| (0..200).map(|_| random.bits() as u8).collect()).collect()
     }
 

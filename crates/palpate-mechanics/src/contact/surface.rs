@@ -4,42 +4,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 use palpate_geometry::Point;
-use palpate_model::Mesh;
-
-/// Lists of lists in two arrays.
-#[derive(Clone, Debug, Default)]
-struct Lists<T> {
-    starts: Vec<u32>,
-    items: Vec<T>,
-}
-
-impl<T: Copy + Ord> Lists<T> {
-    /// Of entries (list, item), which must differ; items are ascending in each list.
-    fn new(count: usize, entries: &[(u32, T)]) -> Self {
-        let mut starts = vec![0_u32; count + 1];
-        for &(list, _) in entries {
-            starts[list as usize + 1] += 1;
-        }
-        for list in 0..count {
-            starts[list + 1] += starts[list];
-        }
-        let mut next = starts.clone();
-        let mut items: Vec<T> = entries.iter().map(|&(_, item)| item).collect();
-        for &(list, item) in entries {
-            items[next[list as usize] as usize] = item;
-            next[list as usize] += 1;
-        }
-        for range in starts.windows(2) {
-            items[range[0] as usize..range[1] as usize].sort_unstable();
-        }
-        Self { starts, items }
-    }
-
-    fn get(&self, list: u32) -> &[T] {
-        let list = list as usize;
-        &self.items[self.starts[list] as usize..self.starts[list + 1] as usize]
-    }
-}
+use palpate_model::{Lists, Mesh};
 
 /// The surface of one body.
 #[derive(Clone, Debug)]
@@ -59,7 +24,6 @@ impl Surface {
         let (triangles, edges) = (mesh.triangles(), mesh.surface_edges());
         let count = mesh.nodes().len();
         let point = |node: u32| DVec3::from_array(mesh.nodes()[node as usize]);
-        let mut node_triangles = Vec::new();
         let mut edge_triangles = Vec::new();
         let mut node_areas = vec![0.0; count];
         let mut edge_areas = vec![0.0; edges.len()];
@@ -69,7 +33,6 @@ impl Surface {
             let area = 0.5 * (point(b) - point(a)).cross(point(c) - point(a)).length();
             volume += point(a).dot(point(b).cross(point(c))) / 6.0;
             for node in [a, b, c] {
-                node_triangles.push((node, index as u32));
                 node_areas[node as usize] += area / 3.0;
             }
             for (&edge, opposite) in sides.iter().zip([c, a, b]) {
@@ -77,8 +40,7 @@ impl Surface {
                 edge_areas[edge as usize] += area / 3.0;
             }
         }
-        let node_neighbours = edges.iter().flat_map(|&[a, b]| [(a, b), (b, a)]).collect::<Vec<_>>();
-        let edge_triangles = Lists::new(edges.len(), &edge_triangles);
+        let edge_triangles = Lists::new(edges.len(), edge_triangles.into_iter());
         let closed = volume > 0.0
             && (0..edges.len() as u32).all(|edge| {
                 let [a, b] = edges[edge as usize];
@@ -86,13 +48,13 @@ impl Surface {
                     let corners = triangles[triangle as usize];
                     (0..3).any(|k| corners[k] == a && corners[(k + 1) % 3] == b)
                 };
-                let list = edge_triangles.get(edge);
+                let list = edge_triangles.of(edge);
                 list.len() % 2 == 0 && 2 * list.iter().filter(|t| forward(t)).count() == list.len()
             });
         Self {
             mesh: Arc::clone(mesh),
-            node_triangles: Lists::new(count, &node_triangles),
-            node_neighbours: Lists::new(count, &node_neighbours),
+            node_triangles: mesh.node_triangles(),
+            node_neighbours: Lists::new(count, edges.iter().flat_map(|&[a, b]| [(a, b), (b, a)])),
             edge_triangles,
             node_areas,
             edge_areas,
@@ -121,17 +83,17 @@ impl Surface {
 
     /// Triangles at an edge, with the node opposite the edge, by triangle.
     pub(crate) fn edge_triangles(&self, edge: u32) -> &[(u32, u32)] {
-        self.edge_triangles.get(edge)
+        self.edge_triangles.of(edge)
     }
 
     /// Triangles at a node, ascending.
     pub(crate) fn node_triangles(&self, node: u32) -> &[u32] {
-        self.node_triangles.get(node)
+        self.node_triangles.of(node)
     }
 
     /// Nodes joined with a node by a surface edge.
     pub(crate) fn node_neighbours(&self, node: u32) -> &[u32] {
-        self.node_neighbours.get(node)
+        self.node_neighbours.of(node)
     }
 
     /// Unit normal of a triangle at `positions`; zero for a degenerate one.

@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 use palpate_contact::PairKind;
+use palpate_testing::Random;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 
@@ -17,23 +18,6 @@ const TWIN_SWEEPS: usize = 20_000;
 const THOROUGH: Effort = Effort { changes: TWIN_SWEEPS as f64, tolerance: 1e-5 };
 /// What that leaves of an error, relative to the largest force.
 const TOLERANCE: f64 = 2e-3;
-
-/// Uniform in [0, 1): splitmix64 (Steele et al. 2014).
-struct Random(u64);
-
-impl Random {
-    fn unit(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    fn between(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * self.unit()
-    }
-}
 
 /// What a random problem is like.
 #[derive(Clone, Copy, Debug)]

@@ -7,6 +7,8 @@
 //! each. The pressure of a tetrahedron is the mean of `k (J_a - 1)` over its nodes, so the forces are
 //! the exact gradient.
 
+use palpate_model::Lists;
+
 use super::group::{Batch, Group, PADDING};
 use super::wide::{Eight, LANES};
 
@@ -16,8 +18,7 @@ pub(super) struct Averaging {
     /// Point of each corner, for the groups that average (the first ones).
     corner_points: Vec<[[u32; LANES]; 4]>,
     /// Tetrahedra of each point as `8 * group + lane`.
-    starts: Vec<u32>,
-    tetrahedra: Vec<u32>,
+    tetrahedra: Lists<u32>,
     /// Four times the rest volume [m³], and what it resists with [Pa].
     volumes: Vec<f64>,
     lambdas: Vec<f64>,
@@ -61,14 +62,7 @@ impl Averaging {
             }
         }
         entries.sort_unstable();
-        result.starts = vec![0; result.lambdas.len() + 1];
-        for &(point, _) in &entries {
-            result.starts[point as usize + 1] += 1;
-        }
-        for point in 0..result.lambdas.len() {
-            result.starts[point + 1] += result.starts[point];
-        }
-        result.tetrahedra = entries.into_iter().map(|(_, tetrahedron)| tetrahedron).collect();
+        result.tetrahedra = Lists::new(result.lambdas.len(), entries.into_iter());
         result.point_pressures = vec![0.0; result.lambdas.len()];
         let count = result.corner_points.len();
         result.element_volumes = vec![[0.0; LANES]; count];
@@ -115,9 +109,8 @@ impl Averaging {
     }
 
     fn sum(&self, point: usize) -> f64 {
-        let range = self.starts[point] as usize..self.starts[point + 1] as usize;
         let volumes = self.element_volumes.as_flattened();
-        self.tetrahedra[range].iter().map(|&entry| volumes[entry as usize]).sum()
+        self.tetrahedra.of(point as u32).iter().map(|&entry| volumes[entry as usize]).sum()
     }
 }
 

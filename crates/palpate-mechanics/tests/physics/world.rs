@@ -6,7 +6,7 @@ use palpate_contact::{IntersectionOptions, PenetratingNode, ProximityPair, Scene
 use palpate_geometry::Point;
 use palpate_mechanics::{ChangedBody, Dynamics, DynamicsOptions, State, StepStats};
 use palpate_model::{Body, Material, Mesh, MeshChange, MeshData, Model, RigidMotion};
-use palpate_testing::{Fastest, box_of_cells};
+use palpate_testing::{Fastest, box_of_cells, rectangle};
 
 pub(crate) const GRAVITY: f64 = 9.81;
 
@@ -19,12 +19,9 @@ pub(crate) fn box_mesh(cells: [usize; 3], size: Point, map: impl Fn(Point) -> Po
 
 /// A rectangle of two triangles at height `z`, facing up.
 pub(crate) fn floor(half: f64, z: f64, map: impl Fn(Point) -> Point) -> Arc<Mesh> {
-    let corners = [[-half, -half, z], [half, -half, z], [half, half, z], [-half, half, z]];
-    let data = MeshData {
-        nodes: corners.map(map).to_vec(),
-        triangles: vec![[0, 1, 2], [0, 2, 3]],
-        ..MeshData::default()
-    };
+    let (nodes, triangles) = rectangle([-half; 2], [half; 2], z);
+    let nodes = nodes.into_iter().map(map).collect();
+    let data = MeshData { nodes, triangles, ..MeshData::default() };
     Arc::new(Mesh::new(data).expect("a valid floor"))
 }
 

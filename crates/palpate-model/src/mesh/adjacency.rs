@@ -2,43 +2,21 @@
 
 use super::surface::for_each_face;
 use super::{Mesh, NONE};
-
-/// The surface triangles around each node, in compressed rows.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct NodeTriangles {
-    offsets: Vec<u32>,
-    triangles: Vec<u32>,
-}
-
-impl NodeTriangles {
-    /// The triangles that use `node`, in rising order; none for an inner node.
-    ///
-    /// # Panics
-    /// If `node` is not a node of the mesh.
-    pub fn around(&self, node: u32) -> &[u32] {
-        let range = self.offsets[node as usize] as usize..self.offsets[node as usize + 1] as usize;
-        &self.triangles[range]
-    }
-}
+use crate::lists::Lists;
 
 impl Mesh {
-    /// The surface triangles around each node. O(n + t).
-    pub fn node_triangles(&self) -> NodeTriangles {
-        let mut offsets = vec![0_u32; self.nodes().len() + 1];
-        for &node in self.triangles().as_flattened() {
-            offsets[node as usize + 1] += 1;
-        }
-        for node in 0..self.nodes().len() {
-            offsets[node + 1] += offsets[node];
-        }
-        let mut next = offsets.clone();
-        let mut triangles = vec![0; 3 * self.triangles().len()];
-        for (corner, &node) in self.triangles().as_flattened().iter().enumerate() {
-            let slot = &mut next[node as usize];
-            triangles[*slot as usize] = corner as u32 / 3;
-            *slot += 1;
-        }
-        NodeTriangles { offsets, triangles }
+    /// The surface triangles around each node, in rising order; none around an inner one. O(n + t).
+    pub fn node_triangles(&self) -> Lists<u32> {
+        let corners = self.triangles().as_flattened().iter().enumerate();
+        let entries = corners.map(|(corner, &node)| (node, corner as u32 / 3));
+        Lists::new(self.nodes().len(), entries)
+    }
+
+    /// The tetrahedra around each node, in rising order. O(n + m).
+    pub fn node_tetrahedra(&self) -> Lists<u32> {
+        let corners = self.tetrahedra().as_flattened().iter().enumerate();
+        let entries = corners.map(|(corner, &node)| (node, corner as u32 / 4));
+        Lists::new(self.nodes().len(), entries)
     }
 
     /// For each tetrahedron its neighbours, shape (m, 4): entry `k` across the face opposite to its

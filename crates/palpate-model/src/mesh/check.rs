@@ -6,6 +6,7 @@ use palpate_geometry::{Point, tetrahedron};
 
 use super::MeshData;
 use super::error::{ElementKind, Indices, MeshError, counted};
+use crate::lists::Lists;
 
 /// Faces are numbered `4 * tetrahedron + face` in 32 bits.
 const MAX_TETRAHEDRA: usize = (u32::MAX / 4) as usize;
@@ -187,26 +188,14 @@ pub(super) fn check_duplicates(data: &MeshData) -> Result<(), MeshError> {
 
 /// Elements with the same nodes as an earlier one, in rising order.
 fn duplicates<const N: usize>(elements: &[[u32; N]], node_count: usize) -> Vec<u32> {
-    let mut offsets = vec![0_u32; node_count + 1];
-    let smallest = |element: &[u32; N]| element.iter().copied().min().unwrap_or(0) as usize;
-    for element in elements {
-        offsets[smallest(element) + 1] += 1;
-    }
-    for node in 0..node_count {
-        offsets[node + 1] += offsets[node];
-    }
-    let mut buckets = vec![0_u32; elements.len()];
-    let mut next = offsets.clone();
-    for (index, element) in elements.iter().enumerate() {
-        let slot = &mut next[smallest(element)];
-        buckets[*slot as usize] = index as u32;
-        *slot += 1;
-    }
+    let smallest = |element: &[u32; N]| element.iter().copied().min().unwrap_or(0);
+    let entries = elements.iter().map(smallest).zip(0_u32..);
+    let by_smallest = Lists::new(node_count, entries);
     let mut repeated = Vec::new();
     let mut keyed: Vec<([u32; N], u32)> = Vec::new();
-    for range in offsets.windows(2) {
+    for elements_of in by_smallest.iter() {
         keyed.clear();
-        keyed.extend(buckets[range[0] as usize..range[1] as usize].iter().map(|&element| {
+        keyed.extend(elements_of.iter().map(|&element| {
             let mut key = elements[element as usize];
             key.sort_unstable();
             (key, element)

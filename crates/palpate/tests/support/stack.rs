@@ -5,6 +5,7 @@ use std::sync::Arc;
 use palpate::cutting::Blade;
 use palpate::model::{Body, Law, RigidMotion};
 use palpate::{Mesh, MeshData, Model, Simulation, SimulationOptions};
+use palpate_testing::rectangle;
 
 use super::boxes::box_data;
 
@@ -20,11 +21,8 @@ pub(crate) fn soft_box(cells: [usize; 3], h: f64, origin: [f64; 3]) -> Arc<Mesh>
 
 /// Two soft boxes, one on the other, on a plate.
 pub(crate) fn model(law: Law) -> Model {
-    let plate = MeshData {
-        nodes: vec![[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]],
-        triangles: vec![[0, 1, 2], [0, 2, 3]],
-        ..MeshData::default()
-    };
+    let (nodes, triangles) = rectangle([-1.0; 2], [1.0; 2], 0.0);
+    let plate = MeshData { nodes, triangles, ..MeshData::default() };
     let mut plate = Body::new("plate", Arc::new(Mesh::new(plate).expect("a plate is a mesh")));
     plate.rigid = Some(RigidMotion::default());
     let mut lower = Body::new("lower", soft_box([4, 3, 2], 0.02, [0.0, 0.0, 0.003]));

@@ -119,7 +119,7 @@ impl Inside {
     /// so that a node that no other covers has nothing there: nothing crosses these triangles, they go
     /// round the node once, and the tetrahedra do not fill all that is around it, let alone more.
     fn is_plain(&self, body: &SceneBody, node: u32) -> bool {
-        let around = body.surface.triangles_of_nodes.around(node);
+        let around = body.surface.triangles_of_nodes.of(node);
         around.iter().all(|&triangle| !self.crosses[triangle as usize])
             && goes_round_once(body, node, around)
             && !is_surrounded(body, node)
@@ -142,7 +142,7 @@ impl Inside {
 
 /// The triangle across an edge; `None` where there are several.
 fn beside(body: &SceneBody, triangle: u32, [from, to]: [u32; 2]) -> Option<u32> {
-    let around = body.surface.triangles_of_nodes.around(from).iter().copied();
+    let around = body.surface.triangles_of_nodes.of(from).iter().copied();
     let has_edge =
         |&other: &u32| other != triangle && body.mesh.triangles()[other as usize].contains(&to);
     let mut others = around.filter(has_edge);
@@ -167,7 +167,7 @@ fn goes_round_once(body: &SceneBody, node: u32, around: &[u32]) -> bool {
 
 /// Whether the tetrahedra around a node may go all round it, or further.
 fn is_surrounded(body: &SceneBody, node: u32) -> bool {
-    let around = body.surface.tetrahedra_of_nodes(&body.mesh).around(node);
+    let around = body.surface.tetrahedra_of_nodes(&body.mesh).of(node);
     let angles = around.iter().map(|&tetrahedron| {
         let nodes = body.mesh.tetrahedra()[tetrahedron as usize];
         let own = nodes.iter().position(|&corner| corner == node).unwrap_or_default();
