@@ -286,7 +286,7 @@ def test_what_has_no_loop(make_box):
         # To a tenth of its height in one step: nothing has a reason to be faster than the tool.
         (3.0, 0.004, 3.0),
         (3.0, 0.0041, 3.0),
-        # Where no body can be it is pressed out: what it falls in the time that is left may be added.
+        # Where no body can be it is pressed out: what it falls in the time left may be added.
         (0.3, -0.02, 0.3 + 9.81 * 2.5),
     ],
 )
