@@ -44,6 +44,8 @@ const SOON: f64 = 0.05;
 const OVERSHOT: f64 = 0.5;
 const MAX_SHORTENED: usize = 6;
 const SHORTEST: f64 = 0.1;
+/// Farthest that a node goes by deformation before the first iteration, in mean edges.
+const FARTHEST_START: f64 = 0.5;
 /// Farthest that a node moves in an iteration, in mean edges.
 const LONGEST_MOVE: f64 = 1.0;
 
@@ -328,7 +330,7 @@ impl ElasticBody {
         contact: Option<&[Point]>,
     ) {
         method.tissue.begin_step(x, self.time_step);
-        self.step.correction.fill([0.0; 3]);
+        self.begin_correction(method.mean_edge);
         (method.iterations, method.known) = (0, 0);
         (method.effort, method.passes) = (0, 1);
         self.step.expected.fill([0.0; 3]);
@@ -356,6 +358,14 @@ impl ElasticBody {
         for (e, turned) in step.expected.iter_mut().zip(step.rotations.turned_by(torque)) {
             *e = (gain * (load / *mass + turned)).to_array();
         }
+    }
+
+    /// Begins where the body would be if it went on with its deformation, or only with a part of it where
+    /// that is large: far beyond its shape a stiff body has forces from which iterations do not come back.
+    fn begin_correction(&mut self, mean_edge: f64) {
+        let way = self.time_step * self.step.fastest_deformation();
+        let less = (1.0 - FARTHEST_START * mean_edge / way).max(0.0) * self.time_step;
+        self.step.begin_correction(less, &self.free_nodes);
     }
 
     /// Iterates from the present correction, with care while contact forces are held. What was learned of

@@ -96,6 +96,16 @@ impl Step {
         self.center
     }
 
+    /// Begins with a correction that takes the deformation of the last `less` seconds back.
+    pub(super) fn begin_correction(&mut self, less: f64, free_nodes: &[u32]) {
+        self.correction.fill([0.0; 3]);
+        if less > 0.0 {
+            for (d, &node) in self.correction.iter_mut().zip(free_nodes) {
+                *d = (-less * self.deformation[node as usize]).to_array();
+            }
+        }
+    }
+
     /// Farthest that the response moves a node, together with what the expected forces turn the body [m].
     pub(super) fn farthest_response(&self, masses: &[f64]) -> f64 {
         let mean = if self.turns {
@@ -117,6 +127,12 @@ impl Step {
             *d = std::array::from_fn(|k| d[k] + e[k] + r[k]);
             (*e, *r) = ([0.0; 3], [0.0; 3]);
         }
+    }
+
+    /// Largest velocity of the deformation at a node [m/s].
+    pub(super) fn fastest_deformation(&self) -> f64 {
+        let squares = self.deformation.iter().map(|v| v.length_squared());
+        squares.fold(0.0, f64::max).sqrt()
     }
 
     /// Velocity of the deformation at a node, in the frame [m/s].
