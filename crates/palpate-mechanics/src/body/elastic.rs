@@ -210,6 +210,11 @@ impl ElasticBody {
         self.free_index[node] != FIXED
     }
 
+    /// Whether caches do not hold the factor.
+    fn has_large_factor(&self) -> bool {
+        self.factor.order().factor_entries > LARGE_FACTOR
+    }
+
     fn is_unattached(&self) -> bool {
         self.free_nodes.len() == self.masses.len()
     }

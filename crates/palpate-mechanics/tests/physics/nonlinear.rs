@@ -174,3 +174,26 @@ fn a_spinning_body_keeps_its_momentum_and_gains_no_energy() {
         assert!(world.dynamics.energy().kinetic > 0.5 * energy, "{law}");
     }
 }
+
+/// A matrix is made anew while somebody holds what it was made of: a cut that is on its way.
+#[test]
+fn a_large_matrix_keeps_its_bits_per_entry_while_a_cut_is_prepared() {
+    let stretched = |is_held: bool| {
+        let mesh = box_mesh([16, 16, 16], [0.1, 0.1, 0.1], |x| x);
+        let body = of_law(Law::NeoHookean, soft("box", &mesh, 5_000.0, 0.01));
+        let mut world = World::new(&model(vec![body], 0.0), DT, 1);
+        let entries = world.dynamics.factor_stats(0).unwrap().entries;
+        assert!(entries > 2_000_000, "a large one: {entries}");
+        let held = is_held.then(|| world.dynamics.basis(0));
+        let longer: Vec<[f64; 3]> = mesh.nodes().iter().map(|&[x, y, z]| [1.3 * x, y, z]).collect();
+        world.dynamics.set_positions(0, &longer).unwrap();
+        assert_eq!(world.step().refactored, 1);
+        drop(held);
+        let bytes = world.dynamics.factor_stats(0).unwrap().bytes;
+        world.step();
+        (bytes, world.dynamics.state())
+    };
+    let (alone, held) = (stretched(false), stretched(true));
+    assert_eq!(alone.0, held.0);
+    assert!(alone.1 == held.1);
+}

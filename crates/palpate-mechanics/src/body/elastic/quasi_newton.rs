@@ -9,7 +9,7 @@ use std::sync::Arc;
 use glam::DVec3;
 use palpate_geometry::Point;
 use palpate_model::{Body, Mesh};
-use palpate_solver::{BlockMatrix, Cholesky, Precision};
+use palpate_solver::{BlockMatrix, Cholesky};
 
 use super::system::SystemMatrix;
 use super::{ElasticBody, Elasticity, FIXED};
@@ -36,6 +36,9 @@ const SLOW: u32 = 6;
 /// The same when a node has moved by more than this part of the body's radius since, apart from the
 /// body's motion as a whole: slow processes need few iterations in each of very many steps.
 const DEFORMED: f64 = 0.1;
+/// Part of that below which many iterations are no reason to make A anew where its factor is large: an A of
+/// nearly the shape that it is of says nothing new, and costs as much as ten frames at rest.
+const NEW_SHAPE: f64 = 0.3;
 /// Part of that from which on an A that is made for another reason takes the present shape; what is made of a
 /// shape near it can be taken over otherwise.
 const SOON: f64 = 0.05;
@@ -256,8 +259,12 @@ impl ElasticBody {
     pub(in crate::body) fn refresh_if_slow(&mut self, x: &[Point], is_coming: bool) -> bool {
         match std::mem::take(&mut self.elasticity) {
             Elasticity::Nonlinear(mut method) => {
-                let slow = method.effort >= SLOW && !is_coming;
-                let due = slow || self.change_of_shape(&method, x) > DEFORMED;
+                let enough = match method.effort {
+                    SLOW.. if !is_coming && self.has_large_factor() => NEW_SHAPE * DEFORMED,
+                    SLOW.. if !is_coming => 0.0,
+                    _ => DEFORMED,
+                };
+                let due = enough == 0.0 || self.change_of_shape(&method, x) > enough;
                 let changed = due && {
                     method.x.clear();
                     method.x.extend(self.arms_of(x).map(|arm| arm.to_array()));
@@ -313,7 +320,7 @@ impl ElasticBody {
             }
             // What a cut that is on its way is made from stays as it is.
             let order = self.factor.order().clone();
-            let made = Cholesky::in_order(system, Precision::Single, order);
+            let made = Cholesky::in_order(system, self.factor.precision(), order);
             made.map(|factor| self.factor = Arc::new(factor)).is_ok()
         };
         let factored = factored(shape) || factored(&[]);
