@@ -250,4 +250,31 @@ mod tests {
         let expected: DVec3 = loads.iter().map(|&(i, f)| gain * levers.of(i).cross(f)).sum();
         assert!((spin - expected).length() < 1e-15);
     }
+
+    #[test]
+    fn loads_without_the_whole_move_and_turn_nothing() {
+        let masses = [1.0, 2.0, 0.5, 1.5];
+        let points = [[0.0, 0.1, 0.2], [1.0, 0.0, 0.3], [0.2, 1.1, 0.0], [0.3, 0.2, 0.9]];
+        let mass: f64 = masses.iter().sum();
+        let points = points.map(DVec3::from_array);
+        let center = masses.iter().zip(points).map(|(&m, x)| m * x).sum::<DVec3>() / mass;
+        let mut rotations = Rotations::default();
+        assert!(rotations.set(&masses, points.iter().map(|&x| x - center), 0.01));
+        let given = [[0.3, -0.2, 0.9], [-1.0, 0.4, 0.2], [0.1, 0.6, -0.3], [2.0, 0.0, 0.5]];
+        let mut loads = given;
+        rotations.take_whole(&masses, mass, &mut loads);
+        let force = |loads: &[[f64; 3]]| loads.iter().map(|&f| DVec3::from(f)).sum::<DVec3>();
+        let torque = |loads: &[[f64; 3]]| {
+            let pairs = rotations.arms().iter().zip(loads);
+            pairs.map(|(r, &f)| r.cross(DVec3::from(f))).sum::<DVec3>()
+        };
+        assert!(force(&loads).length() < 1e-15 && torque(&loads).length() < 1e-15);
+        // What was taken is the inertial load of an acceleration as a whole.
+        let turned: Vec<DVec3> = rotations.turned_by(torque(&given)).collect();
+        let acceleration = force(&given) / mass;
+        for (((now, before), m), turned) in loads.iter().zip(given).zip(masses).zip(turned) {
+            let taken = DVec3::from(before) - DVec3::from(*now);
+            assert!((taken - m * (acceleration + turned)).length() < 1e-15);
+        }
+    }
 }
