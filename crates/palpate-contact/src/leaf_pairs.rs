@@ -7,8 +7,10 @@ use palpate_geometry::Aabb;
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
+use crate::frame::Frame;
+use crate::options::ProximityOptions;
 use crate::proximity::Limit;
-use crate::scene::{DetectionStats, Frame, ProximityOptions};
+use crate::results::DetectionStats;
 
 /// Leaves that one thread takes at a time.
 const LEAVES_PER_TASK: usize = 256;

@@ -27,16 +27,21 @@
 //! ```
 
 pub mod bounding_tree;
+mod error;
+mod frame;
 mod leaf_pairs;
 mod left_out;
+mod memory;
 mod method;
 mod nearest;
 mod neighbours;
+mod options;
 pub mod pairs;
 mod penetration;
 mod points;
 mod proximity;
-pub mod scene;
+mod results;
+mod scene;
 mod simd;
 mod surface;
 pub mod threads;
@@ -44,11 +49,14 @@ mod upper_tree;
 mod wide;
 
 pub use bounding_tree::{BoundingTree, Split, TreeDefect, TreeStats};
+pub use error::SceneError;
+pub use memory::DetectionMemory;
+pub use method::Method;
+pub use options::{IntersectionOptions, ProximityOptions};
 pub use pairs::{PairKind, PenetratingNode, ProximityPair, TrianglePair};
 pub use points::SurfacePoint;
-pub use scene::{
-    ChangedSurface, ContactNodes, DetectionMemory, DetectionStats, IntersectionOptions,
-    Intersections, Method, Penetration, Proximity, ProximityOptions, Scene, SceneError,
-    SceneOptions, SurfaceBasis, UpdateStats,
+pub use results::{
+    ContactNodes, DetectionStats, Intersections, Penetration, Proximity, UpdateStats,
 };
+pub use scene::{ChangedSurface, Scene, SceneOptions, SurfaceBasis};
 pub use threads::Threads;

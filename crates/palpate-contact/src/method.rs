@@ -10,10 +10,11 @@ use std::fmt::Debug;
 use palpate_geometry::Aabb;
 use rayon::ThreadPool;
 
+use crate::frame::{Frame, SceneBody};
+use crate::memory::DetectionMemory;
+use crate::options::IntersectionOptions;
 use crate::proximity::Limit;
-use crate::scene::{
-    DetectionMemory, Frame, IntersectionOptions, Intersections, Proximity, SceneBody,
-};
+use crate::results::{Intersections, Proximity};
 use crate::wide::{WideBody, WideSurface};
 
 /// The methods from lines of a name here, a name in words, and what works by it.

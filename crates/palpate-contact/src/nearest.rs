@@ -9,8 +9,8 @@ mod measures;
 use palpate_geometry::{Aabb, Point};
 
 use crate::bounding_tree::BoundingTree;
+use crate::frame::SceneBody;
 use crate::method::Detector;
-use crate::scene::SceneBody;
 use crate::wide::BlockMeasure;
 
 pub(crate) use measures::{Distance, Entry, HalfLine, rounding_at};

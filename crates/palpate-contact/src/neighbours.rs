@@ -4,7 +4,7 @@ use palpate_geometry::{
     Point, triangles_intersect, triangles_intersect_beyond_edge, triangles_intersect_beyond_node,
 };
 
-use crate::scene::SceneBody;
+use crate::frame::SceneBody;
 
 /// Corners of a triangle, those in a set (bits 0 to 2) first.
 const FIRST: [[usize; 3]; 8] =

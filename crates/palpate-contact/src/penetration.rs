@@ -14,11 +14,13 @@ use std::time::Instant;
 
 use palpate_geometry::Aabb;
 
+use crate::frame::Frame;
 use crate::leaf_pairs::{Cost, for_each};
 use crate::method::Detector;
 use crate::nearest::Surfaces;
+use crate::options::IntersectionOptions;
 use crate::pairs::{PenetratingNode, TrianglePair};
-use crate::scene::{DetectionStats, Frame, IntersectionOptions, Intersections, Penetration};
+use crate::results::{DetectionStats, Intersections, Penetration};
 use exit::Exits;
 use inside::Inside;
 

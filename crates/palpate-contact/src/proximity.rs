@@ -2,9 +2,10 @@
 
 use palpate_geometry::{Point, edge_edge, point_triangle, vec3};
 
+use crate::frame::{Frame, SceneBody};
 use crate::left_out::Elements;
+use crate::options::ProximityOptions;
 use crate::pairs::{PairKind, ProximityPair};
-use crate::scene::{Frame, ProximityOptions, SceneBody};
 
 /// Distances below this fraction of the elements' size are too small to give a direction.
 const DIRECTION_THRESHOLD: f64 = 1e-12;

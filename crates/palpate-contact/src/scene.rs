@@ -1,120 +1,34 @@
 //! The scene: bodies whose nodes move, and what touches what among them.
 
 mod change;
-mod error;
-mod lazy_tree;
-mod memory;
 mod options;
 mod points;
-mod results;
 
 use std::sync::Arc;
 use std::time::Instant;
 
 use palpate_geometry::{Aabb, Point};
 use palpate_model::{Mesh, Structure};
-use rayon::ThreadPool;
 use rayon::prelude::*;
 
-use crate::bounding_tree::{BoundingTree, corner_points};
-use crate::left_out::{Elements, LeftOut};
+use crate::bounding_tree::BoundingTree;
+use crate::error::SceneError;
+use crate::frame::{Frame, SceneBody};
+use crate::left_out::LeftOut;
+use crate::memory::DetectionMemory;
 use crate::method::Detector;
+use crate::options::{IntersectionOptions, ProximityOptions};
 use crate::penetration::PenetrationSearch;
 use crate::points::SurfacePoint;
 use crate::proximity::Limit;
-use crate::surface::Surface;
+use crate::results::{
+    ContactNodes, DetectionStats, Intersections, Penetration, Proximity, UpdateStats,
+};
 use crate::threads::Threads;
 use crate::upper_tree::UpperTree;
 
-pub use crate::method::Method;
-use lazy_tree::LazyTree;
-
 pub use change::{ChangedSurface, SurfaceBasis};
-pub use error::SceneError;
-pub use memory::DetectionMemory;
-pub use options::{IntersectionOptions, ProximityOptions, SceneOptions};
-pub use results::{
-    ContactNodes, DetectionStats, Intersections, Penetration, Proximity, UpdateStats,
-};
-
-/// One body: its mesh and what follows from it, and where its nodes are now.
-#[derive(Debug)]
-pub(crate) struct SceneBody {
-    pub(crate) mesh: Arc<Mesh>,
-    pub(crate) positions: Vec<Point>,
-    tree: LazyTree,
-    pub(crate) surface: Surface,
-}
-
-impl SceneBody {
-    fn new(mesh: Arc<Mesh>, options: &SceneOptions) -> Self {
-        let tree = BoundingTree::new(&mesh, options.leaf_size, options.split);
-        let surface = Surface::new(&mesh, tree.triangle_order());
-        let positions = mesh.nodes().to_vec();
-        Self { mesh, positions, tree: LazyTree::new(tree), surface }
-    }
-
-    /// The bounding tree, refitted to the positions.
-    #[inline]
-    pub(crate) fn tree(&self) -> &BoundingTree {
-        self.tree.get(&self.positions)
-    }
-
-    pub(crate) fn triangle(&self, triangle: u32) -> [Point; 3] {
-        corner_points(&self.positions, self.mesh.triangles()[triangle as usize])
-    }
-}
-
-/// What a search sees of the scene.
-#[derive(Clone, Copy)]
-pub(crate) struct Frame<'a> {
-    pub(crate) bodies: &'a [SceneBody],
-    pub(crate) upper: &'a UpperTree,
-    pub(crate) left_out: &'a LeftOut,
-    /// Whether only bodies are left out, no elements of theirs.
-    pub(crate) all_elements: bool,
-    pub(crate) pool: Option<&'a ThreadPool>,
-}
-
-impl Frame<'_> {
-    /// Whether elements of two bodies may be left out.
-    pub(crate) fn may_leave_out(&self, bodies: [u32; 2]) -> bool {
-        !self.all_elements && self.left_out.concerns(bodies)
-    }
-
-    /// Whether two elements are no pair.
-    #[inline]
-    pub(crate) fn leaves_out(&self, bodies: [u32; 2], elements: Elements) -> bool {
-        !self.all_elements && self.left_out.has(bodies, elements)
-    }
-
-    /// Collects the body pairs (a <= b) whose triangles can meet; returns the upper tree's nodes visited.
-    pub(crate) fn object_pairs(&self, self_contact: bool, found: &mut Vec<(u32, u32)>) -> u64 {
-        found.clear();
-        let visited = self.upper.pairs(found);
-        if self_contact {
-            found.extend((0..self.bodies.len() as u32).map(|body| (body, body)));
-        }
-        found.retain(|&(a, b)| !self.left_out.has_bodies(a, b));
-        visited
-    }
-
-    /// Pairs of triangles that the double loop would test.
-    pub(crate) fn all_pairs(&self, self_contact: bool) -> u64 {
-        let count = |body: u32| self.bodies[body as usize].mesh.triangles().len() as u64;
-        let of_one =
-            |count: u64| if self_contact { count * count.saturating_sub(1) / 2 } else { 0 };
-        let (mut pairs, mut before) = (0, 0);
-        for count in (0..self.bodies.len() as u32).map(count) {
-            pairs += before * count + of_one(count);
-            before += count;
-        }
-        self.left_out.for_each_pair(|a, b| {
-            pairs -= if a == b { of_one(count(a)) } else { count(a) * count(b) };
-        });
-        pairs
-    }
-}
+pub use options::SceneOptions;
 
 /// Bodies in one space, their bounding trees, and the search for what touches.
 ///
@@ -164,7 +78,7 @@ impl Scene {
             let bounds: Vec<Aabb> = meshes.iter().map(|mesh| mesh.bounds()).collect();
             UpperTree::from_bounds(&bounds)
         };
-        let bodies = meshes.into_iter().map(|mesh| SceneBody::new(mesh, &options)).collect();
+        let bodies = meshes.into_iter().map(|mesh| new_body(mesh, &options)).collect();
         let mut scene = Self {
             bodies,
             upper,
@@ -187,7 +101,7 @@ impl Scene {
     /// Adds a body at its mesh's positions and returns its index, the last. In the upper tree a new
     /// root joins it with all others.
     pub fn add(&mut self, mesh: Arc<Mesh>) -> usize {
-        self.bodies.push(SceneBody::new(mesh, &self.options));
+        self.bodies.push(new_body(mesh, &self.options));
         self.upper.add();
         self.bodies_changed();
         self.bodies.len() - 1
@@ -213,7 +127,7 @@ impl Scene {
     /// If there is no such body.
     pub fn replace(&mut self, body: usize, mesh: Arc<Mesh>) -> Result<Arc<Mesh>, SceneError> {
         self.check_body(body)?;
-        let new = SceneBody::new(mesh, &self.options);
+        let new = new_body(mesh, &self.options);
         let former = std::mem::replace(&mut self.bodies[body], new);
         self.left_out.replace(body as u32);
         self.bodies_changed();
@@ -236,6 +150,12 @@ impl Scene {
     /// A body's node positions \[m\] of the last update, shape (n, 3).
     pub fn positions(&self, body: usize) -> &[Point] {
         &self.bodies[body].positions
+    }
+
+    /// What the method keeps in memory; all zero for methods without a layout.
+    pub fn memory(&self) -> DetectionMemory {
+        let triangle_count = self.bodies.iter().map(|body| body.mesh.triangles().len()).sum();
+        DetectionMemory { triangle_count, ..self.detector.memory() }
     }
 
     /// A body's bounding tree, refitted to its positions.
@@ -291,8 +211,7 @@ impl Scene {
         self.check_positions(&positions)?;
         let uses_trees = self.detector.uses_trees();
         let move_body = |(index, body): (usize, &mut SceneBody)| {
-            body.positions.copy_from_slice(positions(index));
-            body.tree.set_moved();
+            body.move_to(positions(index));
             if uses_trees {
                 body.tree();
             }
@@ -448,4 +367,8 @@ impl Scene {
         };
         first.map_or(Ok(()), Err)
     }
+}
+
+fn new_body(mesh: Arc<Mesh>, options: &SceneOptions) -> SceneBody {
+    SceneBody::new(mesh, options.leaf_size, options.split)
 }

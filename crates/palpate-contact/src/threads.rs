@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
-use crate::scene::SceneError;
+use crate::error::SceneError;
 
 /// Threads; clones are the same ones. Whoever calls from one of them loses no time with waking them,
 /// so that all stages of a step should be run by one [`Self::run`].

@@ -3,7 +3,7 @@
 use palpate_geometry::Aabb;
 use palpate_model::Structure;
 
-use crate::scene::SceneError;
+use crate::error::SceneError;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct UpperNode {

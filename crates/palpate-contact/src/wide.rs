@@ -25,7 +25,7 @@ use palpate_geometry::Point;
 use palpate_model::Mesh;
 use palpate_model::mesh::NONE;
 
-use crate::scene::DetectionMemory;
+use crate::memory::DetectionMemory;
 use crate::simd::Isa;
 use adjacency::{Adjacency, Incidence};
 pub(crate) use boxes::Block;

@@ -3,7 +3,8 @@
 use palpate_model::{Lists, Mesh, MeshChange};
 
 use super::{Elements, Filter};
-use crate::scene::{Scene, SceneError};
+use crate::error::SceneError;
+use crate::scene::Scene;
 
 /// The groups of each body's elements.
 #[derive(Clone, Debug, Default)]

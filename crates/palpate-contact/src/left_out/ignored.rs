@@ -1,7 +1,8 @@
 //! Pairs of bodies that are not tested against each other.
 
 use super::{Filter, holds};
-use crate::scene::{Scene, SceneError};
+use crate::error::SceneError;
+use crate::scene::Scene;
 
 /// Pairs of bodies that were chosen.
 #[derive(Clone, Debug, Default)]

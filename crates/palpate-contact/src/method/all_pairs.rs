@@ -5,12 +5,14 @@ use std::time::Instant;
 use palpate_geometry::triangles_intersect;
 
 use super::{Detector, LimitOf};
+use crate::frame::Frame;
 use crate::leaf_pairs::share_a_node;
 use crate::left_out::Elements;
 use crate::neighbours::neighbours_meet;
+use crate::options::IntersectionOptions;
 use crate::pairs::TrianglePair;
 use crate::proximity::{edge_pair, sort, vertex_triangle};
-use crate::scene::{Frame, IntersectionOptions, Intersections, Proximity};
+use crate::results::{Intersections, Proximity};
 
 /// The double loop over all surface elements.
 #[derive(Debug)]

@@ -7,11 +7,13 @@ use palpate_geometry::{Aabb, triangles_intersect, vec3};
 
 use super::paper::Paper;
 use super::{Detector, LimitOf};
+use crate::frame::{Frame, SceneBody};
 use crate::leaf_pairs::share_a_node;
 use crate::left_out::Elements;
 use crate::neighbours::neighbours_meet;
+use crate::options::IntersectionOptions;
 use crate::pairs::TrianglePair;
-use crate::scene::{Frame, IntersectionOptions, Intersections, Proximity, SceneBody};
+use crate::results::{Intersections, Proximity};
 
 /// A triangle over more cells is not rasterised but tested against all others: one long sliver must not
 /// fill the memory.

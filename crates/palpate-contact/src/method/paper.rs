@@ -6,12 +6,14 @@ use palpate_geometry::{Aabb, triangles_intersect};
 
 use super::{Detector, LimitOf};
 use crate::bounding_tree::corner_points;
+use crate::frame::{Frame, SceneBody};
 use crate::leaf_pairs::{BodyPair, Cost, LeafPairSearch, meets, share_a_node, widened};
 use crate::left_out::Elements;
 use crate::neighbours::neighbours_meet;
+use crate::options::IntersectionOptions;
 use crate::pairs::{ProximityPair, TrianglePair};
 use crate::proximity::{edge_pair, sort, vertex_triangle};
-use crate::scene::{Frame, IntersectionOptions, Intersections, Proximity, SceneBody};
+use crate::results::{Intersections, Proximity};
 
 /// Buffers of the paper's method.
 #[derive(Debug, Default)]

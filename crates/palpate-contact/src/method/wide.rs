@@ -8,15 +8,15 @@ use rayon::ThreadPool;
 use rayon::prelude::*;
 
 use super::{Detector, LimitOf};
+use crate::frame::{Frame, SceneBody};
 use crate::leaf_pairs::{BodyPair, Cost, for_each};
 use crate::left_out;
+use crate::memory::DetectionMemory;
 use crate::neighbours::neighbours_meet;
+use crate::options::IntersectionOptions;
 use crate::pairs::{ProximityPair, TrianglePair};
 use crate::proximity::{edge_pair, sort, vertex_triangle};
-use crate::scene::{
-    DetectionMemory, DetectionStats, Frame, IntersectionOptions, Intersections, Proximity,
-    SceneBody,
-};
+use crate::results::{DetectionStats, Intersections, Proximity};
 use crate::simd::Isa;
 use crate::wide::{
     CrossTriangles, EdgePairs, Reach, SeparateTriangles, Sides, Traversal, VertexPairs, WideBody,

@@ -6,7 +6,7 @@
 
 mod own;
 
-use crate::scene::SceneBody;
+use crate::frame::SceneBody;
 
 /// What is known of a node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

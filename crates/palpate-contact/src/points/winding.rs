@@ -3,8 +3,8 @@
 use palpate_geometry::tetrahedron::orientation;
 use palpate_geometry::{Aabb, Point, predicates, triangles_intersect};
 
+use crate::frame::SceneBody;
 use crate::nearest::{HalfLine, Surfaces};
-use crate::scene::SceneBody;
 
 /// Where a point is with respect to a closed surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -5,9 +5,9 @@ use std::sync::Arc;
 use palpate_geometry::Point;
 use palpate_model::{Mesh, MeshChange, Structure};
 
-use super::lazy_tree::LazyTree;
-use super::{Scene, SceneBody, SceneError};
+use super::{Scene, new_body};
 use crate::bounding_tree::BoundingTree;
+use crate::error::SceneError;
 use crate::surface::Surface;
 use crate::upper_tree::UpperTree;
 use crate::wide::WideBody;
@@ -82,9 +82,9 @@ impl Scene {
     /// If there is no such body.
     pub fn surface_basis(&self, body: usize) -> Result<SurfaceBasis, SceneError> {
         self.check_body(body)?;
-        let SceneBody { mesh, tree, .. } = &self.bodies[body];
+        let body = &self.bodies[body];
         let is_packed = self.detector.is_packed();
-        Ok(SurfaceBasis { mesh: Arc::clone(mesh), tree: tree.copy(), is_packed })
+        Ok(SurfaceBasis { mesh: Arc::clone(&body.mesh), tree: body.copy_tree(), is_packed })
     }
 
     /// Goes on with a body that was made for `change`, as [`Self::change_body`]: all but the time that packing
@@ -135,7 +135,7 @@ impl Scene {
             if same.is_none() {
                 self.left_out.forget(body as u32);
             }
-            let new = || SceneBody::new(Arc::clone(mesh), &self.options);
+            let new = || new_body(Arc::clone(mesh), &self.options);
             self.bodies.push(same.unwrap_or_else(new));
         }
         for gone in 0..before.len() {
@@ -143,15 +143,6 @@ impl Scene {
         }
         self.bodies_changed();
         Ok(())
-    }
-}
-
-impl SceneBody {
-    fn change(&mut self, change: &MeshChange, tree: BoundingTree, surface: Surface) {
-        self.positions = change.positions(&self.positions);
-        self.mesh = Arc::clone(&change.mesh);
-        self.tree = LazyTree::waiting(tree);
-        self.surface = surface;
     }
 }
 

@@ -2,7 +2,8 @@
 
 use palpate_geometry::Point;
 
-use super::{Scene, SceneError};
+use super::Scene;
+use crate::error::SceneError;
 use crate::nearest::Surfaces;
 use crate::points::{Among, Ray, SurfacePoint, for_each_point};
 

@@ -11,7 +11,7 @@ use std::f64::consts::PI;
 use palpate_geometry::{Point, vec3};
 
 use super::{Inside, Side, reset};
-use crate::scene::SceneBody;
+use crate::frame::SceneBody;
 
 impl Inside {
     /// Locates the nodes of `body` in itself, given its crossing triangles, also those with common nodes,

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use super::SceneBody;
+use crate::frame::SceneBody;
 use crate::pairs::{PenetratingNode, ProximityPair, TrianglePair};
 
 /// Surface triangles that meet.
@@ -24,7 +24,7 @@ pub struct ContactNodes {
 }
 
 impl ContactNodes {
-    pub(super) fn collect(&mut self, bodies: &[SceneBody], intersections: &Intersections) {
+    pub(crate) fn collect(&mut self, bodies: &[SceneBody], intersections: &Intersections) {
         self.stats = intersections.stats;
         self.nodes.resize(bodies.len(), Vec::new());
         self.nodes.iter_mut().for_each(Vec::clear);

@@ -1,7 +1,5 @@
 //! What detection keeps in memory.
 
-use super::Scene;
-
 /// Bytes that the method of a scene keeps beside the meshes, the positions and the bounding trees.
 ///
 /// The wide layout is all but `buffers`, which grow with what is found and are reused.
@@ -35,13 +33,5 @@ impl DetectionMemory {
     /// Bytes of the layout per surface triangle.
     pub fn layout_per_triangle(&self) -> f64 {
         self.layout() as f64 / self.triangle_count.max(1) as f64
-    }
-}
-
-impl Scene {
-    /// What the method keeps in memory; all zero for methods without a layout.
-    pub fn memory(&self) -> DetectionMemory {
-        let triangle_count = self.bodies.iter().map(|body| body.mesh.triangles().len()).sum();
-        DetectionMemory { triangle_count, ..self.detector.memory() }
     }
 }
