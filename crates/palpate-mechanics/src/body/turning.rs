@@ -39,10 +39,13 @@ impl Levers {
 
     /// Sum of forces on all nodes, in the frame [N], and their torque [N m].
     pub(super) fn load_and_torque(&self, forces: impl Iterator<Item = DVec3>) -> [DVec3; 2] {
-        let sum =
-            |[load, torque]: [DVec3; 2], (r, f): (&DVec3, DVec3)| [load + f, torque + r.cross(f)];
-        self.0.iter().zip(forces).fold([DVec3::ZERO; 2], sum)
+        load_and_torque(&self.0, forces)
     }
+}
+
+fn load_and_torque(arms: &[DVec3], forces: impl Iterator<Item = DVec3>) -> [DVec3; 2] {
+    let sum = |[load, torque]: [DVec3; 2], (r, f): (&DVec3, DVec3)| [load + f, torque + r.cross(f)];
+    arms.iter().zip(forces).fold([DVec3::ZERO; 2], sum)
 }
 
 /// Rotations of one body in its frame.
@@ -95,25 +98,28 @@ impl Rotations {
 
     /// Takes the inertial loads of the motion as a whole out of `loads`.
     pub(super) fn take_whole(&self, masses: &[f64], mass: f64, loads: &mut [[f64; 3]]) {
-        let (mut load, mut torque) = (DVec3::ZERO, DVec3::ZERO);
-        for (r, &f) in self.arms.iter().zip(&*loads) {
-            let f = DVec3::from_array(f);
-            load += f;
-            torque += r.cross(f);
-        }
-        let (acceleration, turn) = (load / mass, self.inverse_inertia * torque);
-        for ((&m, r), f) in masses.iter().zip(&self.arms).zip(loads) {
-            *f = (DVec3::from_array(*f) - m * (acceleration + turn.cross(*r))).to_array();
+        let forces = loads.iter().map(|&f| DVec3::from_array(f));
+        let [load, torque] = load_and_torque(&self.arms, forces);
+        self.take_inertial(masses, load / mass, torque, loads);
+    }
+
+    /// Takes the inertial loads of an acceleration, and of the turn that a torque causes, out of `loads`.
+    fn take_inertial(
+        &self,
+        masses: &[f64],
+        acceleration: DVec3,
+        torque: DVec3,
+        loads: &mut [[f64; 3]],
+    ) {
+        for ((&m, turned), f) in masses.iter().zip(self.turned_by(torque)).zip(loads) {
+            *f = (DVec3::from_array(*f) - m * (acceleration + turned)).to_array();
         }
     }
 
     /// Takes the inertial loads of the turn out of `loads`; returns their torque.
     pub(super) fn balance(&self, masses: &[f64], levers: &Levers, loads: &mut [[f64; 3]]) -> DVec3 {
         let [_, torque] = levers.load_and_torque(loads.iter().map(|&f| DVec3::from_array(f)));
-        let turn = self.inverse_inertia * torque;
-        for ((&m, r), load) in masses.iter().zip(&self.arms).zip(loads) {
-            *load = (DVec3::from_array(*load) - m * turn.cross(*r)).to_array();
-        }
+        self.take_inertial(masses, DVec3::ZERO, torque, loads);
         torque
     }
 

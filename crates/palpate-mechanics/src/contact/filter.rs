@@ -6,6 +6,7 @@
 use glam::DVec3;
 use palpate_contact::{PairKind, PenetratingNode, ProximityPair};
 use palpate_geometry::Point;
+use palpate_geometry::tetrahedron::signed_volume;
 use rayon::prelude::*;
 
 use super::{ContactParameters, Surface, side};
@@ -365,8 +366,8 @@ fn is_inside_out(pair: &ProximityPair, body: &BodyView<'_>) -> bool {
     let mesh = body.surface.mesh();
     let is_turned = |triangle: u32| {
         let Some(&owner) = mesh.triangle_owners().get(triangle as usize) else { return false };
-        let [a, b, c, d] = mesh.tetrahedra()[owner as usize].map(|node| body.at(node));
-        (b - a).cross(c - a).dot(d - a) <= 0.0
+        let corners = mesh.tetrahedra()[owner as usize];
+        signed_volume(&corners.map(|node| body.positions[node as usize])) <= 0.0
     };
     let at_edge = |edge: u32| body.surface.edge_triangles(edge).iter().any(|&(t, _)| is_turned(t));
     let [a, b] = pair.elements;

@@ -345,31 +345,13 @@ impl<P: Stored> pulp::WithSimd for HalfPass<'_, P> {
                     let rows = &mut work.rows[first + row..][..8];
                     let mut vector = 0;
                     while vector + 3 <= vectors {
-                        product::<S, P::Real, 4, 3>(simd, panel, top, row, vector, rows);
-                        product::<S, P::Real, 4, 3>(
-                            simd,
-                            panel,
-                            top,
-                            row + 4,
-                            vector,
-                            &mut rows[4..],
-                        );
+                        eight_rows::<S, P::Real, 3>(simd, panel, top, row, vector, rows);
                         vector += 3;
                     }
                     match vectors - vector {
                         0 => {}
                         1 => product::<S, P::Real, 8, 1>(simd, panel, top, row, vector, rows),
-                        _ => {
-                            product::<S, P::Real, 4, 2>(simd, panel, top, row, vector, rows);
-                            product::<S, P::Real, 4, 2>(
-                                simd,
-                                panel,
-                                top,
-                                row + 4,
-                                vector,
-                                &mut rows[4..],
-                            );
-                        }
+                        _ => eight_rows::<S, P::Real, 2>(simd, panel, top, row, vector, rows),
                     }
                 }
             }
@@ -383,6 +365,22 @@ impl<P: Stored> pulp::WithSimd for HalfPass<'_, P> {
             }
         }
     }
+}
+
+/// Eight rows of a panel times `G` vectors, four at a time: more sums than that have no registers.
+#[allow(clippy::inline_always)] // as above
+#[inline(always)]
+fn eight_rows<S: Simd, T: Real, const G: usize>(
+    simd: S,
+    panel: &[Panel<T>],
+    top: &[[T; SIDES]],
+    row: usize,
+    vector: usize,
+    rows: &mut [[T; SIDES]],
+) {
+    let (upper, lower) = rows.split_at_mut(4);
+    product::<S, T, 4, G>(simd, panel, top, row, vector, upper);
+    product::<S, T, 4, G>(simd, panel, top, row + 4, vector, lower);
 }
 
 /// `R` rows of a panel from `row` on times `G` vectors of right-hand sides from `vector` on.

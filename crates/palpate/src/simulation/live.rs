@@ -165,7 +165,7 @@ impl Simulation {
             self.live.begun.as_ref().filter(|begun| begun.due.saturating_sub(step) <= AWAITED);
         let changed = &self.live_work.changed;
         for body in 0..self.model.bodies.len() {
-            let reached = begun.is_some_and(|begun| begun.reaches(body));
+            let reached = begun.is_some_and(|begun| reach(&begun.strokes, body));
             let passed_by = changed.as_ref().is_some_and(|changed| !changed.contains(&body));
             self.dynamics.await_matrix(body, reached && !passed_by);
         }
@@ -207,8 +207,7 @@ impl Simulation {
 
     fn shapes(&self, strokes: &[Arc<LiveStroke>]) -> Vec<Vec<Point>> {
         let shape = |body| {
-            let reached = strokes.iter().any(|stroke| stroke.reaches(body));
-            if reached { self.dynamics.next_stiff_shape(body) } else { Vec::new() }
+            if reach(strokes, body) { self.dynamics.next_stiff_shape(body) } else { Vec::new() }
         };
         (0..self.model.bodies.len()).map(shape).collect()
     }
@@ -227,7 +226,7 @@ impl Simulation {
         pending.resize(bodies, Vec::new());
         let options = CutOptions::default();
         let basis = |(body, shape): (usize, &Vec<Point>)| {
-            let made_from = begun.reaches(body).then(|| {
+            let made_from = reach(&begun.strokes, body).then(|| {
                 let surface = self.scene.surface_basis(body).expect("a body of the model");
                 (self.dynamics.basis(body).with_shape(shape.clone()), surface)
             });
@@ -282,10 +281,9 @@ impl Simulation {
     }
 }
 
-impl Begun {
-    fn reaches(&self, body: usize) -> bool {
-        self.strokes.iter().any(|stroke| stroke.reaches(body))
-    }
+/// Whether one of the strokes may cut a body.
+fn reach(strokes: &[Arc<LiveStroke>], body: usize) -> bool {
+    strokes.iter().any(|stroke| stroke.reaches(body))
 }
 
 /// All bodies, one of which has changed: for [`LiveCuts::follow`].

@@ -341,13 +341,13 @@ impl ElasticBody {
         (method.iterations, method.known) = (0, 0);
         (method.effort, method.passes) = (0, 1);
         self.step.expected.fill([0.0; 3]);
-        let apart = contact.filter(|_| self.step.turns);
-        if let Some(contact) = apart {
+        let apart = self.step.turns;
+        if let Some(contact) = contact.filter(|_| apart) {
             self.expect_motion(contact);
         }
         self.relax(method, forces, contact);
         if self.is_unattached() {
-            self.put_momentum_right(x, forces, contact.filter(|_| apart.is_none()));
+            self.put_momentum_right(x, forces, contact.filter(|_| !apart));
         }
     }
 
