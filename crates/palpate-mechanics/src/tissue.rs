@@ -8,8 +8,9 @@
 //! Volumetric locking: where lambda is more than [`STIFF_RATIO`] times mu (nu > 0.45) the resistance
 //! to change of volume acts on nodal means (see `averaging`); only [`ELEMENT_RATIO`] times mu of it stays
 //! in the single elements, which keeps elements from changing volume against each other. The
-//! stiffness matrix cannot hold the means (they couple neighbours of neighbours); it counts elements
-//! with lambda capped at [`STIFF_RATIO`] mu and is to be used as a preconditioner there.
+//! stiffness matrix cannot hold the means (they couple neighbours of neighbours); it has all of lambda in the
+//! elements, which is stiffer (a mean has at most the square of what it is of), and is to be used as a
+//! preconditioner there.
 
 // Numeric code is inlined into what was compiled for the vector unit that `dispatch` found, and walks
 // through small arrays by index: closures and iterators may stay outside.
@@ -347,7 +348,7 @@ impl Tissue {
             "pattern of the tetrahedra"
         );
         let mut task = Stiffness {
-            lambda: batch.stiffness_lambda,
+            lambda: batch.averaged_lambda,
             places: &self.places[batch.groups.clone()],
             is_wanted,
             blocks: stiffness.blocks_mut(),
@@ -439,11 +440,10 @@ fn batch(law: Law, averaged: bool, groups: std::ops::Range<usize>) -> Batch {
             law: law.with_lambda(element_lambda),
             viscous: Lame { mu, lambda: element_lambda },
             averaged_lambda: lambda - element_lambda,
-            stiffness_lambda: STIFF_RATIO * mu - element_lambda,
             groups,
         }
     } else {
         let viscous = Lame { mu, lambda };
-        Batch { law, viscous, averaged_lambda: 0.0, stiffness_lambda: 0.0, groups }
+        Batch { law, viscous, averaged_lambda: 0.0, groups }
     }
 }

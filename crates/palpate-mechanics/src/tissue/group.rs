@@ -31,10 +31,8 @@ pub(super) struct Batch {
     pub(super) law: Law,
     /// Lamé parameters of the viscosity.
     pub(super) viscous: Lame,
-    /// What averaged pressures add to lambda [Pa]; 0: none.
+    /// What averaged pressures add to lambda, and the stiffness of single elements counts [Pa]; 0: none.
     pub(super) averaged_lambda: f64,
-    /// What of it the stiffness of single elements counts [Pa].
-    pub(super) stiffness_lambda: f64,
     pub(super) groups: Range<usize>,
 }
 

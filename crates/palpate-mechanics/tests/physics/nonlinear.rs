@@ -175,6 +175,47 @@ fn a_spinning_body_keeps_its_momentum_and_gains_no_energy() {
     }
 }
 
+/// How many matrices are made anew when a box of nearly incompressible tissue, whose iterations are many, is
+/// stretched and let go.
+fn matrices_after_stretch(cells: usize, stretch: f64) -> usize {
+    let mesh = box_mesh([cells; 3], [0.1; 3], |x| x);
+    let mut body = of_law(Law::NeoHookean, soft("box", &mesh, 5_000.0, 0.01));
+    body.material.poisson = 0.4999;
+    let mut world = World::new(&model(vec![body], 0.0), DT, 1);
+    let longer = mesh.nodes().iter().map(|&[x, y, z]| [stretch * x, y, z]).collect::<Vec<_>>();
+    world.dynamics.set_positions(0, &longer).unwrap();
+    world.step().refactored
+}
+
+#[test]
+fn a_matrix_is_made_anew_only_for_another_shape() {
+    let (small, large) = (4, 16);
+    assert_eq!(matrices_after_stretch(small, 1.0 + 1e-5), 0);
+    assert_eq!(matrices_after_stretch(small, 1.005), 1);
+    assert_eq!(matrices_after_stretch(large, 1.005), 0);
+    assert_eq!(matrices_after_stretch(large, 1.1), 1);
+}
+
+#[test]
+fn a_pile_of_nearly_incompressible_tissue_rests_without_new_matrices() {
+    let body = |name: &str, height: f64| {
+        let mesh = box_mesh([5, 5, 3], [0.1, 0.1, 0.06], |[x, y, z]| [x, y, z + height]);
+        let mut body = of_law(Law::NeoHookean, soft(name, &mesh, 5_000.0, 0.01));
+        body.material.poisson = 0.49;
+        body.contact.friction = 0.5;
+        body
+    };
+    let mut floor = rigid("floor", &floor(0.3, 0.0, |x| x));
+    floor.contact.friction = 0.5;
+    let bodies = vec![floor, body("low", 0.01), body("high", 0.08)];
+    let mut world = World::new(&model(bodies, GRAVITY), 1.0 / 60.0, 1);
+    world.run(240);
+    let made: usize = (0..60).map(|_| world.step().refactored).sum();
+    let speeds = (1..3).flat_map(|body| world.dynamics.velocities(body));
+    let fastest = speeds.map(|&v| length(v)).fold(0.0, f64::max);
+    assert!(made == 0 && fastest < 1e-6, "{made} matrices, {fastest:e} m/s");
+}
+
 /// A matrix is made anew while somebody holds what it was made of: a cut that is on its way.
 #[test]
 fn a_large_matrix_keeps_its_bits_per_entry_while_a_cut_is_prepared() {

@@ -36,9 +36,10 @@ const SLOW: u32 = 6;
 /// The same when a node has moved by more than this part of the body's radius since, apart from the
 /// body's motion as a whole: slow processes need few iterations in each of very many steps.
 const DEFORMED: f64 = 0.1;
-/// Part of that below which many iterations are no reason to make A anew where its factor is large: an A of
-/// nearly the shape that it is of says nothing new, and costs as much as ten frames at rest.
-const NEW_SHAPE: f64 = 0.3;
+/// Part of that below which many iterations are no reason to make A anew: an A of nearly the shape that it is of
+/// says nothing new. Where its factor is large a new one costs as much as ten frames at rest.
+const SAME_SHAPE: f64 = 1e-3;
+const SAME_LARGE_SHAPE: f64 = 0.3;
 /// Part of that from which on an A that is made for another reason takes the present shape; what is made of a
 /// shape near it can be taken over otherwise.
 const SOON: f64 = 0.05;
@@ -259,13 +260,12 @@ impl ElasticBody {
     pub(in crate::body) fn refresh_if_slow(&mut self, x: &[Point], is_coming: bool) -> bool {
         match std::mem::take(&mut self.elasticity) {
             Elasticity::Nonlinear(mut method) => {
-                let enough = match method.effort {
-                    SLOW.. if !is_coming && self.has_large_factor() => NEW_SHAPE * DEFORMED,
-                    SLOW.. if !is_coming => 0.0,
-                    _ => DEFORMED,
+                let part = match method.effort {
+                    SLOW.. if !is_coming && self.has_large_factor() => SAME_LARGE_SHAPE,
+                    SLOW.. if !is_coming => SAME_SHAPE,
+                    _ => 1.0,
                 };
-                let due = enough == 0.0 || self.change_of_shape(&method, x) > enough;
-                let changed = due && {
+                let changed = self.change_of_shape(&method, x) > part * DEFORMED && {
                     method.x.clear();
                     method.x.extend(self.arms_of(x).map(|arm| arm.to_array()));
                     let shape = std::mem::take(&mut method.x);
