@@ -6,6 +6,10 @@ mod check;
 mod defects;
 mod error;
 mod measure;
+mod pieces;
+mod removal;
+#[cfg(test)]
+mod row;
 mod surface;
 
 use std::collections::BTreeMap;
