@@ -2,8 +2,8 @@
 
 use std::fmt;
 
-use glam::{DMat3, DVec3};
 use palpate_geometry::Point;
+use palpate_geometry::tetrahedron::signed_volume;
 
 use super::Dynamics;
 
@@ -193,12 +193,13 @@ impl Dynamics {
         body.elastic()?;
         let mesh = self.surfaces[index].mesh();
         let found = mesh.tetrahedra().iter().enumerate().find_map(|(tetrahedron, corners)| {
-            let rest = volume(mesh.nodes(), corners);
-            let after = volume(&body.next_positions, corners) / rest;
+            let volume = |x: &[Point]| signed_volume(&corners.map(|node| x[node as usize]));
+            let rest = volume(mesh.nodes());
+            let after = volume(&body.next_positions) / rest;
             if -TURNED_OVER < after && after < BLOWN_UP {
                 return None;
             }
-            let before = volume(&body.positions, corners) / rest;
+            let before = volume(&body.positions) / rest;
             let growth = if after < 0.0 { -before } else { before };
             let blown = after.abs() > AT_ONCE * growth;
             blown.then_some((tetrahedron, corners[0], Cause::BlownUp { before, after }))
@@ -206,11 +207,6 @@ impl Dynamics {
         let (tetrahedron, node, cause) = found?;
         Some(Failure { body: index, node: node as usize, tetrahedron: Some(tetrahedron), cause })
     }
-}
-
-fn volume(positions: &[Point], corners: &[u32; 4]) -> f64 {
-    let [a, b, c, d] = corners.map(|node| DVec3::from_array(positions[node as usize]));
-    DMat3::from_cols(b - a, c - a, d - a).determinant()
 }
 
 /// The largest value and what it belongs to; undefined ones count as infinite.
