@@ -46,6 +46,17 @@ pub enum Precision {
     BlockFloat,
 }
 
+impl Precision {
+    /// The next one, for matrices that this one is not enough for.
+    fn finer(self) -> Option<Self> {
+        match self {
+            Self::BlockFloat => Some(Self::Single),
+            Self::Single => Some(Self::Double),
+            Self::Double => None,
+        }
+    }
+}
+
 /// Why a matrix has no usable factor.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -130,19 +141,34 @@ enum Packed {
     Double(PackedFactor<Panel<f64>>),
 }
 
-impl Packed {
-    fn block_float(&self) -> Option<&PackedFactor<BlockFloat>> {
-        if let Self::BlockFloat(packed) = self { Some(packed) } else { None }
-    }
-
-    fn single(&self) -> Option<&PackedFactor<Panel<f32>>> {
-        if let Self::Single(packed) = self { Some(packed) } else { None }
-    }
-
-    fn double(&self) -> Option<&PackedFactor<Panel<f64>>> {
-        if let Self::Double(packed) = self { Some(packed) } else { None }
-    }
+/// What the numbers of a factor are kept as.
+trait Kind: Stored {
+    fn of(packed: &Packed) -> Option<&PackedFactor<Self>>;
+    fn packed(factor: PackedFactor<Self>) -> Packed;
+    fn spare(memory: &mut Memory) -> &mut Spare<Self>;
 }
+
+macro_rules! kind {
+    ($stored:ty, $variant:ident, $spare:ident) => {
+        impl Kind for $stored {
+            fn of(packed: &Packed) -> Option<&PackedFactor<Self>> {
+                if let Packed::$variant(factor) = packed { Some(factor) } else { None }
+            }
+
+            fn packed(factor: PackedFactor<Self>) -> Packed {
+                Packed::$variant(factor)
+            }
+
+            fn spare(memory: &mut Memory) -> &mut Spare<Self> {
+                &mut memory.$spare
+            }
+        }
+    };
+}
+
+kind!(BlockFloat, BlockFloat, block_float);
+kind!(Panel<f32>, Single, single);
+kind!(Panel<f64>, Double, double);
 
 impl Default for Packed {
     fn default() -> Self {
@@ -316,59 +342,45 @@ impl Cholesky {
         self.give_memory();
         let memory = self.memory.clone();
         let memory = &mut *memory.lock();
-        let mut contributions = Vec::new();
-        let mut is_accurate = false;
-        if self.precision == Precision::BlockFloat {
-            let (packed, kept) =
-                self.factored(matrix, change, keeps, memory, Packed::block_float, |memory| {
-                    &mut memory.block_float
-                })?;
-            (self.packed, contributions) = (Packed::BlockFloat(packed), kept);
-            is_accurate = Probe::new(self, matrix, &mut memory.probe).is_accurate_in_block_float();
-        }
-        if !is_accurate && self.precision != Precision::Double {
-            let (packed, kept) =
-                self.factored(matrix, change, keeps, memory, Packed::single, |memory| {
-                    &mut memory.single
-                })?;
-            (self.packed, contributions) = (Packed::Single(packed), kept);
-            is_accurate = Probe::new(self, matrix, &mut memory.probe).is_accurate_in_single();
-        }
-        if !is_accurate {
-            let (packed, kept) =
-                self.factored(matrix, change, keeps, memory, Packed::double, |memory| {
-                    &mut memory.double
-                })?;
-            (self.packed, contributions) = (Packed::Double(packed), kept);
+        let mut precision = self.precision;
+        let contributions = loop {
+            let kept;
+            (self.packed, kept) = match precision {
+                Precision::BlockFloat => {
+                    self.factored::<BlockFloat>(matrix, change, keeps, memory)?
+                }
+                Precision::Single => self.factored::<Panel<f32>>(matrix, change, keeps, memory)?,
+                Precision::Double => self.factored::<Panel<f64>>(matrix, change, keeps, memory)?,
+            };
             let probe = Probe::new(self, matrix, &mut memory.probe);
-            if !probe.is_accurate() {
-                return Err(FactorError::Inaccurate { residual: probe.residual });
+            if probe.is_accurate(precision) {
+                break kept;
             }
-        }
+            let residual = probe.residual;
+            precision = precision.finer().ok_or(FactorError::Inaccurate { residual })?;
+        };
         memory.trim();
         self.kept = keeps.then(|| Kept { matrix: matrix.clone(), contributions });
         Ok(())
     }
 
-    /// Computes what the older factor has not, if it `has` this kind; and what is kept for the next change.
-    fn factored<P: Stored>(
+    /// Computes what the older factor has not, if it is of this kind; and what is kept for the next change.
+    fn factored<K: Kind>(
         &mut self,
         matrix: &BlockMatrix,
         change: Option<&Change>,
         keeps: bool,
         memory: &mut Memory,
-        has: impl FnOnce(&Packed) -> Option<&PackedFactor<P>>,
-        spare: impl FnOnce(&mut Memory) -> &mut Spare<P>,
-    ) -> Result<(PackedFactor<P>, Vec<Option<Contribution>>), FactorError> {
-        let known = change.and_then(|change| Some((change, has(&change.older.packed)?)));
+    ) -> Result<(Packed, Vec<Option<Contribution>>), FactorError> {
+        let known = change.and_then(|change| Some((change, K::of(&change.older.packed)?)));
         let mut plan = self.plan(known, keeps);
         self.computed = plan.computed_count();
-        let mut panels = std::mem::take(spare(memory));
+        let mut panels = std::mem::take(K::spare(memory));
         let Memory { fronts, contributions, .. } = memory;
         let packed = fronts
             .factor(&self.supernodes, matrix, &mut plan, &mut panels, contributions)
             .map_err(|place| self.not_positive(place))?;
-        Ok((packed, plan.into_kept()))
+        Ok((K::packed(packed), plan.into_kept()))
     }
 
     /// What to compute where the columns of the changed factor are `known`.

@@ -8,14 +8,11 @@ use palpate_solver::{
     BlockMatrix, BlockPattern, Cholesky, FactorError, HalfSolution, NodeOrder, Precision,
     half_products, half_products_between,
 };
+use palpate_testing::{Fastest, Random, box_of_cells};
 use proptest::prelude::*;
 
 /// A random symmetric matrix on `cliques`, made positive definite by diagonal dominance.
-fn dominant(
-    node_count: usize,
-    cliques: &[[u32; 4]],
-    values: &mut impl FnMut() -> f64,
-) -> BlockMatrix {
+fn dominant(node_count: usize, cliques: &[[u32; 4]], random: &mut Random) -> BlockMatrix {
     let pattern = Arc::new(BlockPattern::from_cliques(node_count, cliques));
     let mut matrix = BlockMatrix::zeros(Arc::clone(&pattern));
     for col in 0..node_count as u32 {
@@ -23,8 +20,8 @@ fn dominant(
             let mut block = [[0.0; 3]; 3];
             for i in 0..3 {
                 for j in 0..=i {
-                    block[i][j] = values();
-                    block[j][i] = if row == col { block[i][j] } else { values() };
+                    block[i][j] = random.between(-0.5, 0.5);
+                    block[j][i] = if row == col { block[i][j] } else { random.between(-0.5, 0.5) };
                 }
             }
             matrix.add(row, col, &block);
@@ -86,30 +83,10 @@ fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
 }
 
-fn draws(seed: u64) -> impl FnMut() -> f64 {
-    let mut state = seed.wrapping_mul(2).wrapping_add(1);
-    move || {
-        state =
-            state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
-    }
-}
-
-/// Five tetrahedra per cell of a box of nodes.
-fn grid(n: u32) -> (usize, Vec<[u32; 4]>) {
-    let at = |i: u32, j: u32, k: u32| i + n * (j + n * k);
-    let mut cliques = Vec::new();
-    for (i, j, k) in
-        (0..(n - 1).pow(3)).map(|c| (c % (n - 1), c / (n - 1) % (n - 1), c / (n - 1).pow(2)))
-    {
-        let corner = |b: u32| at(i + (b & 1), j + (b >> 1 & 1), k + (b >> 2 & 1));
-        for tet in
-            [[0, 1, 3, 7], [0, 3, 2, 7], [0, 2, 6, 7], [0, 6, 4, 7], [0, 4, 5, 7], [0, 5, 1, 7]]
-        {
-            cliques.push(tet.map(corner));
-        }
-    }
-    ((n * n * n) as usize, cliques)
+/// Six tetrahedra per cell of a cube of `n` nodes along each axis.
+fn grid(n: usize) -> (usize, Vec<[u32; 4]>) {
+    let (nodes, tetrahedra) = box_of_cells([n - 1; 3], Fastest::First, |place| place);
+    (nodes.len(), tetrahedra)
 }
 
 /// Three right-hand sides of one.
@@ -132,12 +109,12 @@ proptest! {
     ) {
         let cliques: Vec<[u32; 4]> =
             cliques.into_iter().map(|c| c.map(|node| node % node_count as u32)).collect();
-        let mut values = draws(seed);
-        let matrix = dominant(node_count, &cliques, &mut values);
+        let mut random = Random(seed);
+        let matrix = dominant(node_count, &cliques, &mut random);
         let factor = Cholesky::new(&matrix).unwrap();
         let mut workspace = factor.workspace();
 
-        let rhs: Vec<[f64; 3]> = (0..node_count).map(|_| std::array::from_fn(|_| values())).collect();
+        let rhs: Vec<_> = (0..node_count).map(|_| random.vector(0.5)).collect();
         let mut sparse = rhs.clone();
         factor.solve_in_place(&mut sparse, &mut workspace);
         let expected = solve_densely(to_dense(&matrix), rhs.as_flattened().to_vec());
@@ -264,9 +241,9 @@ proptest! {
 #[test]
 fn a_large_grid_is_solved_and_gives_the_same_bits_twice() {
     let (node_count, cliques) = grid(12);
-    let mut values = draws(3);
-    let matrix = dominant(node_count, &cliques, &mut values);
-    let rhs: Vec<[f64; 3]> = (0..node_count).map(|_| std::array::from_fn(|_| values())).collect();
+    let mut random = Random(3);
+    let matrix = dominant(node_count, &cliques, &mut random);
+    let rhs: Vec<_> = (0..node_count).map(|_| random.vector(0.5)).collect();
     let solve = || {
         let factor = Cholesky::new(&matrix).unwrap();
         let mut x = rhs.clone();
@@ -287,7 +264,7 @@ fn a_large_grid_is_solved_and_gives_the_same_bits_twice() {
 #[test]
 fn refactoring_uses_the_new_values() {
     let (node_count, cliques) = grid(4);
-    let mut matrix = dominant(node_count, &cliques, &mut draws(1));
+    let mut matrix = dominant(node_count, &cliques, &mut Random(1));
     let mut factor = Cholesky::new(&matrix).unwrap();
     for block in matrix.blocks_mut() {
         for value in block.as_flattened_mut() {
@@ -307,7 +284,7 @@ fn refactoring_uses_the_new_values() {
 #[test]
 fn a_node_without_stiffness_is_named() {
     let (node_count, cliques) = grid(3);
-    let mut matrix = dominant(node_count, &cliques, &mut draws(1));
+    let mut matrix = dominant(node_count, &cliques, &mut Random(1));
     let index = matrix.pattern().find(13, 13).unwrap();
     matrix.blocks_mut()[index][1][1] = -1.0;
     match Cholesky::new(&matrix) {
@@ -329,9 +306,9 @@ fn an_empty_matrix_is_fine() {
 #[test]
 fn fewer_bits_are_close_and_give_way_to_more_where_they_are_not() {
     let (node_count, cliques) = grid(6);
-    let mut values = draws(5);
-    let mut matrix = dominant(node_count, &cliques, &mut values);
-    let rhs: Vec<[f64; 3]> = (0..node_count).map(|_| std::array::from_fn(|_| values())).collect();
+    let mut random = Random(5);
+    let mut matrix = dominant(node_count, &cliques, &mut random);
+    let rhs: Vec<_> = (0..node_count).map(|_| random.vector(0.5)).collect();
     let solved = |factor: &Cholesky| {
         let mut x = rhs.clone();
         factor.solve_in_place(&mut x, &mut factor.workspace());
@@ -379,7 +356,7 @@ fn fewer_bits_are_close_and_give_way_to_more_where_they_are_not() {
 #[test]
 fn half_solutions_do_not_depend_on_what_is_solved_with_them() {
     let (node_count, cliques) = grid(8);
-    let matrix = dominant(node_count, &cliques, &mut draws(7));
+    let matrix = dominant(node_count, &cliques, &mut Random(7));
     for (precision, _) in LIMITS {
         let factor = Cholesky::with_precision(&matrix, precision).unwrap();
         let mut workspace = factor.workspace();

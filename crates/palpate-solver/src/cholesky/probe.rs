@@ -1,7 +1,7 @@
 //! What a solve with a known right-hand side leaves: a matrix may be positive definite and yet have no factor
 //! of use.
 
-use super::{Cholesky, SolveWorkspace};
+use super::{Cholesky, Precision, SolveWorkspace};
 use crate::BlockMatrix;
 
 /// Largest residual, relative to the right-hand side.
@@ -68,18 +68,14 @@ impl Probe {
         }
     }
 
-    /// Whether a factor in double precision is of use.
-    pub(super) fn is_accurate(&self) -> bool {
-        self.residual < TOLERANCE
-    }
-
-    /// Whether one in single precision is.
-    pub(super) fn is_accurate_in_single(&self) -> bool {
-        self.residual < SINGLE_TOLERANCES[0] && self.error < SINGLE_TOLERANCES[1]
-    }
-
-    /// Whether one in sixteen bits is.
-    pub(super) fn is_accurate_in_block_float(&self) -> bool {
-        self.energy_error < BLOCK_FLOAT_TOLERANCE
+    /// Whether a factor kept in this precision is of use.
+    pub(super) fn is_accurate(&self, precision: Precision) -> bool {
+        match precision {
+            Precision::Double => self.residual < TOLERANCE,
+            Precision::Single => {
+                self.residual < SINGLE_TOLERANCES[0] && self.error < SINGLE_TOLERANCES[1]
+            }
+            Precision::BlockFloat => self.energy_error < BLOCK_FLOAT_TOLERANCE,
+        }
     }
 }

@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
+use palpate_testing::{Fastest, Random, box_of_cells};
 use proptest::prelude::*;
 
 use crate::cholesky::packed::Panel;
@@ -34,15 +35,6 @@ struct Element {
     seed: u64,
 }
 
-fn draws(seed: u64) -> impl FnMut() -> f64 {
-    let mut state = seed.wrapping_mul(2).wrapping_add(1);
-    move || {
-        state =
-            state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
-    }
-}
-
 impl Mesh {
     fn number(&self, name: u32) -> Option<u32> {
         self.nodes.iter().position(|&other| other == name).map(|number| number as u32)
@@ -55,11 +47,10 @@ impl Mesh {
         let mut matrix = BlockMatrix::zeros(pattern);
         let unit = |x: f64| [[x, 0.0, 0.0], [0.0, x, 0.0], [0.0, 0.0, x]];
         for (nodes, element) in cliques.iter().zip(&self.elements) {
-            let mut draw = draws(element.seed);
+            let mut random = Random(element.seed);
             for (index, &a) in nodes.iter().enumerate() {
                 for &b in &nodes[..index] {
-                    let mut block = [[0.0; 3]; 3];
-                    block.as_flattened_mut().iter_mut().for_each(|value| *value = draw());
+                    let mut block = [0; 3].map(|_| random.vector(0.5));
                     let stiffness = if self.is_loose { 1.0 } else { 2.0 };
                     if self.is_loose {
                         block = unit(-1.0);
@@ -200,23 +191,17 @@ fn changes() -> impl Strategy<Value = Vec<Change>> {
     prop::collection::vec(change, 1..4)
 }
 
-/// Six tetrahedra per cell of a box of nodes.
-fn grid(n: u32) -> Mesh {
-    let at = |i: u32, j: u32, k: u32| i + n * (j + n * k);
-    let cells =
-        (0..(n - 1).pow(3)).map(|c| (c % (n - 1), c / (n - 1) % (n - 1), c / (n - 1).pow(2)));
-    let mut elements = Vec::new();
-    for (i, j, k) in cells {
-        let corner = |b: u32| at(i + (b & 1), j + (b >> 1 & 1), k + (b >> 2 & 1));
-        for tet in
-            [[0, 1, 3, 7], [0, 3, 2, 7], [0, 2, 6, 7], [0, 6, 4, 7], [0, 4, 5, 7], [0, 5, 1, 7]]
-        {
-            elements.push(Element { nodes: tet.map(corner), seed: elements.len() as u64 });
-        }
-    }
-    let nodes: Vec<u32> = (0..n * n * n).collect();
-    let mut mesh =
-        Mesh { order: nodes.clone(), next_name: n * n * n, nodes, elements, ..Mesh::default() };
+/// Six tetrahedra per cell of a cube of `n` nodes along each axis.
+fn grid(n: usize) -> Mesh {
+    let (nodes, tetrahedra) = box_of_cells([n - 1; 3], Fastest::First, |place| place);
+    let nodes: Vec<u32> = (0..nodes.len() as u32).collect();
+    let mut mesh = Mesh {
+        order: nodes.clone(),
+        next_name: nodes.len() as u32,
+        nodes,
+        elements: (0..).zip(tetrahedra).map(|(seed, nodes)| Element { nodes, seed }).collect(),
+        ..Mesh::default()
+    };
     mesh.order = NodeOrder::new(mesh.matrix().pattern()).nodes;
     mesh
 }
@@ -243,8 +228,8 @@ fn assert_same(changed: &Cholesky, fresh: &Cholesky) {
         _ => panic!("kept in another precision"),
     }
     let count = fresh.node_count();
-    let mut draw = draws(count as u64);
-    let rhs: Vec<[f64; 3]> = (0..count).map(|_| std::array::from_fn(|_| draw())).collect();
+    let mut random = Random(count as u64);
+    let rhs: Vec<_> = (0..count).map(|_| random.vector(0.5)).collect();
     let nodes: Vec<u32> = (0..count as u32).step_by(3).collect();
     let solved = |factor: &Cholesky| {
         let (mut x, mut workspace) = (rhs.clone(), factor.workspace());
