@@ -30,6 +30,12 @@ pub(crate) struct Effort {
     pub(crate) tolerance: f64,
 }
 
+impl Effort {
+    /// For all solves of a step but the first: tissue that needs them goes on by up to a contact distance
+    /// after each.
+    pub(crate) const AGAIN: Self = Self { changes: 8.0, tolerance: 3e-2 };
+}
+
 impl Default for Effort {
     fn default() -> Self {
         Self { changes: 8.0, tolerance: 1e-4 }

@@ -40,6 +40,8 @@ pub(crate) struct Response {
     last: LastForces,
     /// Forces found so far in this step, where the solve begins.
     guess: LastForces,
+    /// Whether this is not the first solve of the step.
+    is_again: bool,
 }
 
 impl Response {
@@ -85,6 +87,7 @@ impl Response {
             close
         });
         self.guess.clone_from(&self.last);
+        self.is_again = false;
         self.problem.collect(&self.candidates, body_count, &body);
         std::mem::swap(&mut self.contacts, &mut self.contacts_before);
         self.contacts.clear();
@@ -113,6 +116,7 @@ impl Response {
         body: impl Fn(usize) -> &'a MovingBody,
     ) {
         self.guess.restore(&self.forces);
+        self.is_again = true;
         self.problem.collect(&self.candidates, body_count, &body);
         self.contacts.clear();
     }
@@ -156,7 +160,8 @@ impl Response {
             let force = known.of(&candidates[index]).map_or([0.0; 3], |known| known.force);
             problem.blocks()[index].axes.transpose() * DVec3::from_array(force)
         };
-        let cost = self.solver.solve(problem, candidates, Effort::default(), guess);
+        let effort = if self.is_again { Effort::AGAIN } else { Effort::default() };
+        let cost = self.solver.solve(problem, candidates, effort, guess);
         self.report(body);
         cost
     }
