@@ -4,7 +4,7 @@
 use std::sync::OnceLock;
 
 use palpate_model::mesh::NONE;
-use palpate_model::{Lists, Mesh};
+use palpate_model::{DisjointSets, Lists, Mesh};
 
 /// Fixed facts of a surface.
 ///
@@ -16,7 +16,7 @@ pub(crate) struct Surface {
     pub(crate) owned: Vec<u8>,
     /// Per surface edge, the triangle that owns it, as an index into the mesh's triangles.
     pub(crate) edge_owners: Vec<u32>,
-    /// Whether the surface bounds a volume: every edge is passed as often forwards as backwards.
+    /// Whether the surface bounds a volume.
     pub(crate) closed: bool,
     /// Per node, the smallest node of its connected part of the surface; itself for an inner node.
     pub(crate) components: Vec<u32>,
@@ -53,7 +53,7 @@ impl Surface {
         Self {
             owned,
             edge_owners,
-            closed: is_closed(mesh),
+            closed: mesh.is_closed(),
             component_nodes: mesh.surface_nodes().iter().copied().filter(smallest).collect(),
             components,
             triangles_of_nodes: mesh.node_triangles(),
@@ -67,41 +67,12 @@ impl Surface {
     }
 }
 
-fn is_closed(mesh: &Mesh) -> bool {
-    let mut balance = vec![0_i32; mesh.surface_edges().len()];
-    for (nodes, edges) in mesh.triangles().iter().zip(mesh.triangle_edges()) {
-        for side in 0..3 {
-            let forwards = nodes[side] < nodes[(side + 1) % 3];
-            balance[edges[side] as usize] += if forwards { 1 } else { -1 };
-        }
-    }
-    !balance.is_empty() && balance.iter().all(|&balance| balance == 0)
-}
-
 /// Labels each node with the smallest node that triangles connect it with.
 fn join_nodes(mesh: &Mesh) -> Vec<u32> {
-    let mut labels: Vec<u32> = (0..mesh.nodes().len() as u32).collect();
+    let mut parts = DisjointSets::new(mesh.nodes().len());
     for &[a, b, c] in mesh.triangles() {
-        join(&mut labels, a, b);
-        join(&mut labels, b, c);
+        parts.join(a, b);
+        parts.join(b, c);
     }
-    // Labels never exceed their index: one sweep upwards makes each of them final.
-    for node in 0..labels.len() {
-        labels[node] = labels[labels[node] as usize];
-    }
-    labels
-}
-
-fn join(labels: &mut [u32], a: u32, b: u32) {
-    let (a, b) = (root(labels, a), root(labels, b));
-    labels[a.max(b) as usize] = a.min(b);
-}
-
-fn root(labels: &mut [u32], mut node: u32) -> u32 {
-    while labels[node as usize] != node {
-        let above = labels[labels[node as usize] as usize];
-        labels[node as usize] = above;
-        node = above;
-    }
-    node
+    (0..mesh.nodes().len() as u32).map(|node| parts.root(node)).collect()
 }

@@ -1,13 +1,12 @@
 //! The cut of one mesh: sheet after sheet.
 
 use palpate_geometry::{Aabb, Point, tetrahedron};
-use palpate_model::{Mesh, MeshChange, MeshError};
+use palpate_model::{DisjointSets, Mesh, MeshChange, MeshError};
 use serde::{Deserialize, Serialize};
 
 use crate::blade::{Blade, Sheet};
 use crate::crossing::{Crossing, Sides, crossed_edges};
 use crate::draft::Draft;
-use crate::groups::Groups;
 use crate::report::CutReport;
 use crate::separate;
 use crate::snap;
@@ -320,7 +319,7 @@ fn finish(mesh: &Mesh, volume: f64, draft: Draft, total: SheetCut) -> Result<Cut
 
 /// How many pieces without a common node there are: `mesh.pieces().len()`, without the lists.
 fn piece_count(mesh: &Mesh) -> usize {
-    let mut groups = Groups::new(mesh.nodes().len());
+    let mut groups = DisjointSets::new(mesh.nodes().len());
     let mut is_used = vec![false; mesh.nodes().len()];
     for &[a, b, c, d] in mesh.tetrahedra() {
         is_used[a as usize] = true;

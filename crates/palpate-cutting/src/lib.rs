@@ -9,7 +9,6 @@ mod blade;
 mod crossing;
 mod cut;
 mod draft;
-mod groups;
 mod report;
 mod separate;
 mod snap;

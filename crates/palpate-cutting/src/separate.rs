@@ -1,11 +1,10 @@
 //! Opens the faces that lie on the sheet between its two sides, by copying nodes.
 
 use palpate_geometry::{tetrahedron, vec3};
-use palpate_model::TETRAHEDRON_FACES;
+use palpate_model::{DisjointSets, TETRAHEDRON_FACES};
 
 use crate::crossing::Sides;
 use crate::draft::Draft;
-use crate::groups::Groups;
 
 /// What was opened.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -118,7 +117,7 @@ fn outcome(draft: &Draft, next: &Draft, face: &CutFace) -> Outcome {
 
 /// The tetrahedra at the cut that are part of too small a piece, sorted.
 fn flakes(draft: &Draft, cut: &[CutFace], min_volume: f64) -> Vec<u32> {
-    let mut groups = Groups::new(draft.positions.len());
+    let mut groups = DisjointSets::new(draft.positions.len());
     for &[a, b, c, d] in &draft.tetrahedra {
         groups.join(a, b);
         groups.join(a, c);
@@ -223,7 +222,7 @@ fn copy_nodes(draft: &mut Draft, cut: &[CutFace], is_marked: &[bool]) -> usize {
     faces.sort_unstable();
 
     // A slot is a corner of a tetrahedron; those that a face joins use one copy.
-    let mut slots = Groups::new(4 * around.len());
+    let mut slots = DisjointSets::new(4 * around.len());
     let slot = |place: u32, node: u32| {
         let nodes = draft.tetrahedra[around[place as usize] as usize];
         let corner = nodes.iter().position(|&other| other == node).expect("a node of its face");

@@ -1,6 +1,7 @@
 //! Object data (tetrahedral meshes and their files), the model language and the model it describes.
 
 pub mod body;
+mod disjoint_sets;
 pub mod files;
 pub mod language;
 mod lists;
@@ -12,6 +13,7 @@ pub use body::{
     Material, Model, Parameter, Pose, PoseParts, Range, RigidKey, RigidMotion, Structure,
     triangle_axes,
 };
+pub use disjoint_sets::DisjointSets;
 pub use files::{
     FileError, FileErrorCause, MESH_EXTENSIONS, ReadMesh, ReadOptions, read_mesh, write_mesh,
     write_model,

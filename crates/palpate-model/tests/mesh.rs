@@ -298,3 +298,18 @@ proptest! {
         prop_assert_eq!(mesh.nodes().len() + report.unused_nodes.count, data.nodes.len());
     }
 }
+
+#[test]
+fn a_surface_is_closed_until_a_triangle_is_missing_or_turned() {
+    let (mesh, _) = Mesh::repaired(box_data([2, 1, 1], [1.0; 3])).unwrap();
+    assert!(mesh.is_closed());
+    let surface = |triangles: Vec<[u32; 3]>| {
+        Mesh::new(MeshData { nodes: mesh.nodes().to_vec(), triangles, ..MeshData::default() })
+    };
+    let mut triangles = mesh.triangles().to_vec();
+    assert!(surface(triangles.clone()).unwrap().is_closed());
+    triangles[3].swap(0, 1);
+    assert!(!surface(triangles.clone()).unwrap().is_closed());
+    triangles.remove(3);
+    assert!(!surface(triangles).unwrap().is_closed());
+}

@@ -40,25 +40,14 @@ impl Surface {
                 edge_areas[edge as usize] += area / 3.0;
             }
         }
-        let edge_triangles = Lists::new(edges.len(), edge_triangles.into_iter());
-        let closed = volume > 0.0
-            && (0..edges.len() as u32).all(|edge| {
-                let [a, b] = edges[edge as usize];
-                let forward = |&(triangle, _): &(u32, u32)| {
-                    let corners = triangles[triangle as usize];
-                    (0..3).any(|k| corners[k] == a && corners[(k + 1) % 3] == b)
-                };
-                let list = edge_triangles.of(edge);
-                list.len() % 2 == 0 && 2 * list.iter().filter(|t| forward(t)).count() == list.len()
-            });
         Self {
             mesh: Arc::clone(mesh),
             node_triangles: mesh.node_triangles(),
             node_neighbours: Lists::new(count, edges.iter().flat_map(|&[a, b]| [(a, b), (b, a)])),
-            edge_triangles,
+            edge_triangles: Lists::new(edges.len(), edge_triangles.into_iter()),
             node_areas,
             edge_areas,
-            closed,
+            closed: volume > 0.0 && mesh.is_closed(),
         }
     }
 

@@ -132,9 +132,7 @@ impl Body {
 
     /// Whether the regions exist, and the laws of all tetrahedra fit together.
     fn validate_regions(&self) -> Result<(), BodyError> {
-        let mut known = self.mesh.regions().to_vec();
-        known.sort_unstable();
-        known.dedup();
+        let known = self.mesh.region_numbers();
         for (index, &(region, _)) in self.regions.iter().enumerate() {
             if known.binary_search(&region).is_err() {
                 return Err(BodyError::UnknownRegion { region, known });

@@ -19,8 +19,8 @@ const FIXED: &str = "fixed";
 /// body, its nodes in metres where the model has them at rest. Returns all files, the model file last.
 ///
 /// Bodies come in the order of the structure. What the text was that the model came from is not kept:
-/// transforms are in the meshes. An attachment is
-/// written by its reach and found again when the model is loaded.
+/// transforms are in the meshes. An attachment is written by its reach and found again when the model
+/// is loaded.
 ///
 /// # Errors
 /// If a file cannot be written; those before it are complete.

@@ -1,4 +1,4 @@
-//! Legacy `.vtk` files, versions 2.0 to 5.1, ASCII and binary.
+//! Legacy `.vtk` files, versions 1.0 to 5.1, ASCII and binary.
 //!
 //! Layout after the "VTK File Formats" chapter of the VTK User's Guide; version 5 stores cells as
 //! offsets and connectivity.

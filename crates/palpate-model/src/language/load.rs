@@ -168,6 +168,7 @@ struct Build<'a> {
     loader: &'a dyn MeshLoader,
     /// Meshes as in their files; `None` for those that could not be read.
     meshes: HashMap<PathBuf, Option<Arc<Mesh>>>,
+    /// Names that are taken: those that the text gives, then those made.
     names: HashSet<String>,
     /// How many names were made from each stem.
     stems: HashMap<String, usize>,
@@ -244,9 +245,7 @@ impl Build<'_> {
         inherited: &Inherited,
         placement: &Pose,
     ) -> Option<Vec<(i32, Material)>> {
-        let mut known = mesh.regions().to_vec();
-        known.sort_unstable();
-        known.dedup();
+        let known = mesh.region_numbers();
         let errors_before = self.errors.len();
         for block in &tree.settings.regions {
             if known.binary_search(&block.region).is_err() {

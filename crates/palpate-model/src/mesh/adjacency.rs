@@ -4,6 +4,13 @@ use super::surface::for_each_face;
 use super::{Mesh, NONE};
 use crate::lists::Lists;
 
+/// How many triangles run through a surface edge from its smaller to its larger node, and back.
+#[derive(Clone, Default)]
+pub(super) struct EdgeUse {
+    pub(super) forward: u32,
+    pub(super) backward: u32,
+}
+
 impl Mesh {
     /// The surface triangles around each node, in rising order; none around an inner one. O(n + t).
     pub fn node_triangles(&self) -> Lists<u32> {
@@ -30,5 +37,25 @@ impl Mesh {
             }
         });
         neighbors
+    }
+
+    /// Whether the surface is one with two sides: there is one, and triangles run through each of its
+    /// edges as often forwards as backwards.
+    pub fn is_closed(&self) -> bool {
+        let edges = self.edge_uses();
+        !edges.is_empty() && edges.iter().all(|edge| edge.forward == edge.backward)
+    }
+
+    /// By surface edge.
+    pub(super) fn edge_uses(&self) -> Vec<EdgeUse> {
+        let mut uses = vec![EdgeUse::default(); self.surface_edges().len()];
+        for (triangle, edges) in self.triangles().iter().zip(self.triangle_edges()) {
+            for (side, &edge) in edges.iter().enumerate() {
+                let forward = triangle[side] < triangle[(side + 1) % 3];
+                let count = &mut uses[edge as usize];
+                *(if forward { &mut count.forward } else { &mut count.backward }) += 1;
+            }
+        }
+        uses
     }
 }

@@ -4,10 +4,12 @@ use std::fmt;
 
 use palpate_geometry::{Point, tetrahedron};
 
+use super::adjacency::EdgeUse;
 use super::check::used_by_elements;
 use super::error::{Indices, counted};
 use super::surface::for_each_face;
 use super::{Mesh, NONE, QualitySummary};
+use crate::disjoint_sets::DisjointSets;
 
 /// Something suspicious in a valid mesh. Its `Display` says what to do.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -127,7 +129,7 @@ impl Mesh {
             (0..self.triangles().len() as u32).filter(flat).collect(),
         );
 
-        let edges = edge_uses(self);
+        let edges = self.edge_uses();
         let with = |wrong: fn(&EdgeUse) -> bool| -> Indices {
             (0..edges.len() as u32).filter(|&edge| wrong(&edges[edge as usize])).collect()
         };
@@ -186,29 +188,10 @@ fn is_flat([a, b, c]: [Point; 3]) -> bool {
     })
 }
 
-/// How many triangles run through a surface edge from its smaller to its larger node, and back.
-#[derive(Clone, Default)]
-struct EdgeUse {
-    forward: u32,
-    backward: u32,
-}
-
-fn edge_uses(mesh: &Mesh) -> Vec<EdgeUse> {
-    let mut uses = vec![EdgeUse::default(); mesh.surface_edges().len()];
-    for (triangle, edges) in mesh.triangles().iter().zip(mesh.triangle_edges()) {
-        for (side, &edge) in edges.iter().enumerate() {
-            let forward = triangle[side] < triangle[(side + 1) % 3];
-            let count = &mut uses[edge as usize];
-            *(if forward { &mut count.forward } else { &mut count.backward }) += 1;
-        }
-    }
-    uses
-}
-
 /// Surface nodes whose triangles form more than one fan joined by edges.
 fn pinched_nodes(mesh: &Mesh) -> Indices {
     // Corners (3 * triangle + position) of one node are joined across the edges that they share.
-    let mut corners = UnionFind::new(3 * mesh.triangles().len());
+    let mut corners = DisjointSets::new(3 * mesh.triangles().len());
     let mut corners_at_edge = vec![[NONE; 2]; mesh.surface_edges().len()];
     for (triangle, (nodes, edges)) in mesh.triangles().iter().zip(mesh.triangle_edges()).enumerate()
     {
@@ -228,7 +211,7 @@ fn pinched_nodes(mesh: &Mesh) -> Indices {
     let mut fan = vec![NONE; mesh.nodes().len()];
     let mut pinched = Vec::new();
     for (corner, &node) in mesh.triangles().as_flattened().iter().enumerate() {
-        let root = corners.find(corner as u32);
+        let root = corners.root(corner as u32);
         if fan[node as usize] == NONE {
             fan[node as usize] = root;
         } else if fan[node as usize] != root {
@@ -242,35 +225,12 @@ fn pinched_nodes(mesh: &Mesh) -> Indices {
 
 /// The smallest node of every part that hangs together by shared nodes.
 fn first_node_of_each_part(mesh: &Mesh) -> Indices {
-    let mut parts = UnionFind::new(mesh.nodes().len());
+    let mut parts = DisjointSets::new(mesh.nodes().len());
     let mut join_all = |nodes: &[u32]| nodes[1..].iter().for_each(|&n| parts.join(nodes[0], n));
     mesh.tetrahedra().iter().for_each(|nodes| join_all(nodes));
     mesh.triangles().iter().for_each(|nodes| join_all(nodes));
     let used = used_by_elements(&mesh.data);
     (0..mesh.nodes().len() as u32)
-        .filter(|&node| used[node as usize] && parts.find(node) == node)
+        .filter(|&node| used[node as usize] && parts.root(node) == node)
         .collect()
-}
-
-/// Disjoint sets whose root is their smallest member.
-struct UnionFind(Vec<u32>);
-
-impl UnionFind {
-    fn new(count: usize) -> Self {
-        Self((0..count as u32).collect())
-    }
-
-    fn find(&mut self, mut item: u32) -> u32 {
-        while self.0[item as usize] != item {
-            let parent = self.0[item as usize];
-            self.0[item as usize] = self.0[parent as usize];
-            item = parent;
-        }
-        item
-    }
-
-    fn join(&mut self, left: u32, right: u32) {
-        let (left, right) = (self.find(left), self.find(right));
-        self.0[left.max(right) as usize] = left.min(right);
-    }
 }

@@ -63,6 +63,14 @@ impl Mesh {
         self.surface_edges().iter().map(length).sum::<f64>() / self.surface_edges().len() as f64
     }
 
+    /// The numbers of its regions, each once, ascending.
+    pub(crate) fn region_numbers(&self) -> Vec<i32> {
+        let mut numbers = self.regions().to_vec();
+        numbers.sort_unstable();
+        numbers.dedup();
+        numbers
+    }
+
     /// Shape of all tetrahedra; `None` for a surface-only mesh.
     pub fn quality(&self) -> Option<QualitySummary> {
         if self.is_surface_only() {

@@ -1,37 +1,27 @@
 //! The pieces that a mesh consists of.
 
-use std::collections::BTreeMap;
-
-use super::Mesh;
+use super::{Mesh, NONE};
+use crate::disjoint_sets::DisjointSets;
 
 impl Mesh {
     /// The tetrahedra that hang together, each piece sorted, by their first tetrahedra: those of two
     /// pieces have no node in common.
     pub fn pieces(&self) -> Vec<Vec<u32>> {
-        let mut label: Vec<u32> = (0..self.nodes().len() as u32).collect();
-        let root = |label: &mut Vec<u32>, mut node: u32| {
-            while label[node as usize] != node {
-                label[node as usize] = label[label[node as usize] as usize];
-                node = label[node as usize];
-            }
-            node
-        };
-        for corners in self.tetrahedra() {
-            let first = root(&mut label, corners[0]);
-            for &corner in &corners[1..] {
-                let other = root(&mut label, corner);
-                label[other as usize] = first;
+        let mut parts = DisjointSets::new(self.nodes().len());
+        for &[first, ref others @ ..] in self.tetrahedra() {
+            for &node in others {
+                parts.join(first, node);
             }
         }
-        let mut piece_of: BTreeMap<u32, usize> = BTreeMap::new();
+        let mut piece_of = vec![NONE; self.nodes().len()];
         let mut pieces: Vec<Vec<u32>> = Vec::new();
-        for (tetrahedron, corners) in self.tetrahedra().iter().enumerate() {
-            let label = root(&mut label, corners[0]);
-            let piece = *piece_of.entry(label).or_insert(pieces.len());
-            if piece == pieces.len() {
+        for (tetrahedron, corners) in (0..).zip(self.tetrahedra()) {
+            let piece = &mut piece_of[parts.root(corners[0]) as usize];
+            if *piece == NONE {
+                *piece = pieces.len() as u32;
                 pieces.push(Vec::new());
             }
-            pieces[piece].push(tetrahedron as u32);
+            pieces[*piece as usize].push(tetrahedron);
         }
         pieces
     }
