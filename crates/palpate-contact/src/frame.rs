@@ -9,7 +9,7 @@ use palpate_model::{Mesh, MeshChange};
 use rayon::ThreadPool;
 
 use crate::bounding_tree::{BoundingTree, Split, corner_points};
-use crate::left_out::{Elements, LeftOut};
+use crate::left_out::{ElementPair, LeftOut};
 use crate::surface::Surface;
 use crate::upper_tree::UpperTree;
 use lazy_tree::LazyTree;
@@ -79,8 +79,8 @@ impl Frame<'_> {
 
     /// Whether two elements are no pair.
     #[inline]
-    pub(crate) fn leaves_out(&self, bodies: [u32; 2], elements: Elements) -> bool {
-        !self.all_elements && self.left_out.has(bodies, elements)
+    pub(crate) fn leaves_out(&self, bodies: [u32; 2], pair: ElementPair) -> bool {
+        !self.all_elements && self.left_out.has(bodies, pair)
     }
 
     /// Collects the body pairs (a <= b) whose triangles can meet; returns the upper tree's nodes visited.

@@ -8,7 +8,7 @@ use palpate_model::{Mesh, MeshChange};
 
 /// Surface elements of two bodies, or of one, by index.
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum Elements {
+pub(crate) enum ElementPair {
     /// A triangle of each.
     Triangles([u32; 2]),
     /// A node of the first and a triangle of the second.
@@ -31,7 +31,7 @@ pub(crate) trait Filter {
     }
 
     /// Whether two elements are no pair, of those that touch or are close: a node inside is inside.
-    fn has(&self, _bodies: [u32; 2], _elements: Elements) -> bool {
+    fn has(&self, _bodies: [u32; 2], _pair: ElementPair) -> bool {
         false
     }
 
@@ -72,8 +72,8 @@ macro_rules! filters {
 
             /// Whether two elements are left out.
             #[inline]
-            pub(crate) fn has(&self, bodies: [u32; 2], elements: Elements) -> bool {
-                false $(|| self.$name.has(bodies, elements))*
+            pub(crate) fn has(&self, bodies: [u32; 2], pair: ElementPair) -> bool {
+                false $(|| self.$name.has(bodies, pair))*
             }
 
             /// Calls `each` with every pair of bodies that is left out, once.

@@ -3,7 +3,7 @@
 use palpate_geometry::{Point, edge_edge, point_triangle, vec3};
 
 use crate::frame::{Frame, SceneBody};
-use crate::left_out::Elements;
+use crate::left_out::ElementPair;
 use crate::options::ProximityOptions;
 use crate::pairs::{PairKind, ProximityPair};
 
@@ -41,7 +41,7 @@ pub(crate) fn vertex_triangle(
     if limit.options.each_feature_once && !is_first(b, triangle, found.weights) {
         return None;
     }
-    if frame.leaves_out([body_a, body_b], Elements::NodeAndTriangle([node, triangle])) {
+    if frame.leaves_out([body_a, body_b], ElementPair::NodeAndTriangle([node, triangle])) {
         return None;
     }
     if !limit.options.close_at_rest {
@@ -108,7 +108,7 @@ pub(crate) fn edge_pair(
     if gap >= limit.distance || (limit.options.each_feature_once && weights.contains(&0.0)) {
         return None;
     }
-    if frame.leaves_out([body_a, body_b], Elements::Edges([edge_a, edge_b])) {
+    if frame.leaves_out([body_a, body_b], ElementPair::Edges([edge_a, edge_b])) {
         return None;
     }
     if !limit.options.close_at_rest {

@@ -2,7 +2,7 @@
 
 use palpate_model::{Lists, Mesh, MeshChange};
 
-use super::{Elements, Filter};
+use super::{ElementPair, Filter};
 use crate::error::SceneError;
 use crate::scene::Scene;
 
@@ -36,12 +36,12 @@ impl Filter for Groups {
     }
 
     #[inline]
-    fn has(&self, [a, b]: [u32; 2], elements: Elements) -> bool {
+    fn has(&self, [a, b]: [u32; 2], pair: ElementPair) -> bool {
         let (Some(a), Some(b)) = (self.of(a), self.of(b)) else { return false };
-        let [of_a, of_b] = match elements {
-            Elements::Triangles([i, j]) => [a.of_triangle(i), b.of_triangle(j)],
-            Elements::NodeAndTriangle([i, j]) => [a.nodes.of(i), b.of_triangle(j)],
-            Elements::Edges([i, j]) => [a.edges.of(i), b.edges.of(j)],
+        let [of_a, of_b] = match pair {
+            ElementPair::Triangles([i, j]) => [a.of_triangle(i), b.of_triangle(j)],
+            ElementPair::NodeAndTriangle([i, j]) => [a.nodes.of(i), b.of_triangle(j)],
+            ElementPair::Edges([i, j]) => [a.edges.of(i), b.edges.of(j)],
         };
         of_a.iter().any(|group| of_b.contains(group))
     }

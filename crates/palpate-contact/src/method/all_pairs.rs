@@ -7,7 +7,7 @@ use palpate_geometry::triangles_intersect;
 use super::{Detector, LimitOf};
 use crate::frame::Frame;
 use crate::leaf_pairs::share_a_node;
-use crate::left_out::Elements;
+use crate::left_out::ElementPair;
 use crate::neighbours::neighbours_meet;
 use crate::options::IntersectionOptions;
 use crate::pairs::TrianglePair;
@@ -45,7 +45,7 @@ impl Detector for AllPairs {
                         let triangles = [triangle_a as u32, triangle_b as u32];
                         let neighbours = same && share_a_node(corners_a, corners_b);
                         if neighbours && !options.shared_nodes
-                            || frame.leaves_out(bodies, Elements::Triangles(triangles))
+                            || frame.leaves_out(bodies, ElementPair::Triangles(triangles))
                         {
                             continue;
                         }

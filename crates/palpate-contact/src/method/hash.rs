@@ -9,7 +9,7 @@ use super::paper::Paper;
 use super::{Detector, LimitOf};
 use crate::frame::{Frame, SceneBody};
 use crate::leaf_pairs::share_a_node;
-use crate::left_out::Elements;
+use crate::left_out::ElementPair;
 use crate::neighbours::neighbours_meet;
 use crate::options::IntersectionOptions;
 use crate::pairs::TrianglePair;
@@ -239,7 +239,7 @@ fn meeting(
     let triangles = [a.index, b.index];
     if neighbours && !shared_nodes
         || frame.left_out.has_bodies(a.body, b.body)
-        || frame.leaves_out([a.body, b.body], Elements::Triangles(triangles))
+        || frame.leaves_out([a.body, b.body], ElementPair::Triangles(triangles))
     {
         return None;
     }

@@ -8,7 +8,7 @@ use super::{Detector, LimitOf};
 use crate::bounding_tree::corner_points;
 use crate::frame::{Frame, SceneBody};
 use crate::leaf_pairs::{BodyPair, Cost, LeafPairSearch, meets, share_a_node, widened};
-use crate::left_out::Elements;
+use crate::left_out::ElementPair;
 use crate::neighbours::neighbours_meet;
 use crate::options::IntersectionOptions;
 use crate::pairs::{ProximityPair, TrianglePair};
@@ -93,7 +93,7 @@ fn is_left_out(frame: &Frame, pair: &BodyPair, [i, j]: [u32; 2]) -> bool {
             frame.bodies[body as usize].tree().triangle_order()[position as usize]
         };
         let triangles = [triangle(pair.a, i), triangle(pair.b, j)];
-        frame.leaves_out(bodies, Elements::Triangles(triangles))
+        frame.leaves_out(bodies, ElementPair::Triangles(triangles))
     }
 }
 

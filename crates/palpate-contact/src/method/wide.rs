@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use super::{Detector, LimitOf};
 use crate::frame::{Frame, SceneBody};
 use crate::leaf_pairs::{BodyPair, Cost, for_each};
-use crate::left_out;
+use crate::left_out::ElementPair;
 use crate::memory::DetectionMemory;
 use crate::neighbours::neighbours_meet;
 use crate::options::IntersectionOptions;
@@ -455,7 +455,7 @@ impl Search<'_> {
             let bodies = [pair.a, pair.b];
             if self.frame.may_leave_out(bodies) {
                 let is_kept = |slots: &[u32; 2]| {
-                    !self.frame.leaves_out(bodies, left_out::Elements::Triangles(triangles(slots)))
+                    !self.frame.leaves_out(bodies, ElementPair::Triangles(triangles(slots)))
                 };
                 crossing.retain(is_kept);
                 open.retain(is_kept);

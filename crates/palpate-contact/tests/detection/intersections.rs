@@ -10,8 +10,8 @@ use palpate_model::Mesh;
 use proptest::prelude::*;
 
 use crate::scenes::{
-    Case, Point, Positions, Random, as_slices, block, cases, deforming, horseshoe, jittered, sheet,
-    soup,
+    Case, Point, Positions, Random, as_slices, block, cases, deforming, horseshoe, jittered,
+    rounded, sheet, soup,
 };
 
 pub(crate) fn scene(meshes: &[Arc<Mesh>], options: SceneOptions) -> Scene {
@@ -238,10 +238,9 @@ proptest! {
         let at = random.vector(2.0);
         let meshes =
             vec![soup(12, 1.2, &mut random), jittered([2, 2, 3], at, 0.2, &mut random)];
-        // Few digits make coincidences: equal coordinates, coplanar and collinear corners.
-        let grid = 2.0_f64.powi(digits);
+        let round = rounded(digits);
         let case = deforming(meshes, 2, &mut random).and(|p| {
-            let [x, y, z] = p.map(|value| (value * grid).round() / grid);
+            let [x, y, z] = round(p);
             [x, y, if flat { x } else { z }]
         });
         check(&case);

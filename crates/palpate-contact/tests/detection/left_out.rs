@@ -13,7 +13,7 @@ use proptest::prelude::*;
 
 use crate::intersections::scene;
 use crate::scenes::{
-    Case, Random, as_slices, block, cases, deforming, horseshoe, jittered, sheet, soup,
+    Case, Random, as_slices, block, cases, deforming, horseshoe, jittered, rounded, sheet, soup,
 };
 
 const SHARED: IntersectionOptions =
@@ -271,10 +271,8 @@ proptest! {
             jittered([2, 2, 2], at, 0.2, &mut random),
             horseshoe(6, 1, [0.0; 3]),
         ];
-        let grid = 2.0_f64.powi(digits);
         let left_out = LeftOut::random(&meshes, &mut random);
-        let case = deforming(meshes, 1, &mut random)
-            .and(|p| p.map(|value| (value * grid).round() / grid));
+        let case = deforming(meshes, 1, &mut random).and(rounded(digits));
         check(&case, &left_out, 0.3);
     }
 }

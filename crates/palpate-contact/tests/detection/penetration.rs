@@ -9,7 +9,7 @@ use proptest::prelude::*;
 
 use crate::intersections::{brute_force as brute_force_pairs, scene, share_nodes};
 use crate::scenes::{
-    Case, Random, as_slices, block, block_data, cases, deforming, jittered, sheet, soup,
+    Case, Random, as_slices, block, block_data, cases, deforming, jittered, rounded, sheet, soup,
 };
 
 fn surface(scene: &Scene, body: usize) -> impl Iterator<Item = [Point; 3]> + '_ {
@@ -561,9 +561,7 @@ proptest! {
         let mut random = Random(seed);
         let at = random.vector(1.5);
         let meshes = vec![soup(8, 1.0, &mut random), jittered([2, 2, 2], at, 0.2, &mut random)];
-        let grid = 2.0_f64.powi(digits);
-        let case = deforming(meshes, 2, &mut random)
-            .and(|p| p.map(|value| (value * grid).round() / grid));
+        let case = deforming(meshes, 2, &mut random).and(rounded(digits));
         check(&case, &[true; 2]);
     }
 

@@ -5,7 +5,7 @@ use palpate_geometry::{Point, point_triangle, vec3};
 use proptest::prelude::*;
 
 use crate::intersections::scene;
-use crate::scenes::{Random, as_slices, block, cases, deforming, jittered, sheet, soup};
+use crate::scenes::{Random, as_slices, block, cases, deforming, jittered, rounded, sheet, soup};
 
 fn corners(scene: &Scene, body: usize, triangle: usize) -> [Point; 3] {
     scene.mesh(body).triangles()[triangle].map(|node| scene.positions(body)[node as usize])
@@ -323,9 +323,7 @@ proptest! {
         let mut random = Random(seed);
         let at = random.vector(1.5);
         let meshes = vec![soup(8, 1.0, &mut random), jittered([2, 2, 2], at, 0.2, &mut random)];
-        let grid = 2.0_f64.powi(digits);
-        let case = deforming(meshes, 1, &mut random)
-            .and(|p| p.map(|value| (value * grid).round() / grid));
+        let case = deforming(meshes, 1, &mut random).and(rounded(digits));
         for frame in &case.frames {
             let mut first = None;
             for options in every_way() {

@@ -7,7 +7,8 @@ use proptest::prelude::*;
 
 use crate::intersections::scene;
 use crate::scenes::{
-    Case, Point, Positions, Random, as_slices, block, cases, deforming, jittered, sheet, soup,
+    Case, Point, Positions, Random, as_slices, block, cases, deforming, jittered, rounded, sheet,
+    soup,
 };
 
 /// A length to measure distances with: the frame's longest side, in cells.
@@ -178,9 +179,7 @@ proptest! {
         let mut random = Random(seed);
         let at = random.vector(2.0);
         let meshes = vec![soup(8, 1.2, &mut random), jittered([2, 2, 2], at, 0.2, &mut random)];
-        let grid = 2.0_f64.powi(digits);
-        let case = deforming(meshes, 1, &mut random)
-            .and(|p| p.map(|value| (value * grid).round() / grid));
+        let case = deforming(meshes, 1, &mut random).and(rounded(digits));
         check(&case, &[0.02, 0.3]);
     }
 }

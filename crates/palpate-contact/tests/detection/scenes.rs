@@ -135,6 +135,12 @@ impl Case {
     }
 }
 
+/// Leaves coordinates so many binary digits: few make coincidences, such as coplanar and collinear corners.
+pub(crate) fn rounded(digits: i32) -> impl Fn(Point) -> Point {
+    let grid = 2.0_f64.powi(digits);
+    move |p| p.map(|value| (value * grid).round() / grid)
+}
+
 fn shifted(by: Point) -> impl Fn(Point) -> Point {
     move |p| std::array::from_fn(|axis| p[axis] + by[axis])
 }

@@ -9,7 +9,7 @@ use proptest::prelude::*;
 
 use crate::intersections::scene;
 use crate::penetration::{check, is_solid};
-use crate::scenes::{Case, Point, Positions, Random, as_slices, block, block_data};
+use crate::scenes::{Case, Point, Positions, Random, as_slices, block, block_data, rounded};
 
 /// A block slit at z = 1 where `open` holds, and its lips: nodes below and above.
 struct Slit {
@@ -133,9 +133,7 @@ proptest! {
         let mut random = Random(seed);
         for slit in [Slit::new([4, 2, 2], half), Slit::new([5, 5, 2], within)] {
             let exact = slit.moved(depth, noise, &mut random);
-            let grid = 2.0_f64.powi(digits);
-            let round = |p: &Point| p.map(|value| (value * grid).round() / grid);
-            let rounded = exact.iter().map(round).collect();
+            let rounded = exact.iter().copied().map(rounded(digits)).collect();
             for positions in [exact, rounded] {
                 let case = slit.case(vec![positions]);
                 let mut scene = scene(&case.meshes, SceneOptions::default());
