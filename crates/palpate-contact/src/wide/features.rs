@@ -4,7 +4,7 @@
 //! (`Reach::separated`), so that nothing depends on how good the approximation is.
 
 use super::boxes::{corners, gather};
-use super::separation::{Reach, cross, dot, sub};
+use super::separation::{Reach, cross, dot, keep, sub};
 use super::{WIDTH, WideBody};
 use crate::simd::{Kernel, Lanes};
 
@@ -67,16 +67,6 @@ impl Kernel for EdgePairs<'_> {
             let axis = between_edges(along_a, ends_b);
             let apart = reach.separated(axis, [[L::splat(0.0); 3], along_a], ends_b);
             keep(batch, apart, kept);
-        }
-    }
-}
-
-#[inline(always)]
-fn keep<L: Lanes>(batch: &[[u32; 2]], apart: L, kept: &mut Vec<[u32; 2]>) {
-    let apart = apart.bits();
-    for (i, candidate) in batch.iter().enumerate() {
-        if apart >> i & 1 == 0 {
-            kept.push(*candidate);
         }
     }
 }

@@ -94,6 +94,8 @@ fn left_count(count: usize) -> usize {
 
 #[cfg(test)]
 mod tests {
+    use palpate_testing::Random;
+
     use super::{block_order, key, left_count};
 
     #[test]
@@ -114,13 +116,10 @@ mod tests {
 
     #[test]
     fn blocks_are_halves_of_halves() {
-        let mut state = 7_u64;
+        let mut random = Random(7);
         for count in [0, 1, 8, 9, 16, 17, 31, 32, 33, 64, 65, 300] {
-            let mut value = || {
-                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(99);
-                // Few values, so that many are equal.
-                (state >> 33) as f64 % 7.0
-            };
+            // Few values, so that many are equal.
+            let mut value = || random.below(7) as f64;
             let centers: Vec<_> = (0..count).map(|_| [value(), value(), value()]).collect();
             let order = block_order(&centers);
             let mut sorted = order.clone();

@@ -124,12 +124,18 @@ impl Kernel for SeparateTriangles<'_> {
                     apart = apart.or(reach.separated(cross(edges_b[i], normal_b), of_a, of_b));
                 }
             }
-            let apart = apart.bits();
-            for (i, candidate) in batch.iter().enumerate() {
-                if apart >> i & 1 == 0 {
-                    kept.push(*candidate);
-                }
-            }
+            keep(batch, apart, kept);
+        }
+    }
+}
+
+/// Passes on the candidates that are not in the lanes `apart`.
+#[inline(always)]
+pub(super) fn keep<L: Lanes>(batch: &[[u32; 2]], apart: L, kept: &mut Vec<[u32; 2]>) {
+    let apart = apart.bits();
+    for (i, candidate) in batch.iter().enumerate() {
+        if apart >> i & 1 == 0 {
+            kept.push(*candidate);
         }
     }
 }
