@@ -333,7 +333,8 @@ def test_pages_get_what_any_of_them_wants(viewer):
         viewer.send({**show, "field": field})
         values = viewer.arrays("frame")[f"field/{field}"]
         assert len(values) == len(arrays["positions"])
-        assert 0 == values.min() < values.max()
+        # The tray does not deform, but to round-off of the fit.
+        assert 0 <= values.min() < 1e-12 * values.max()
     assert len(viewer.arrays("frame")["field/depth"]) == len(values)
     viewer.send({"type": "show", "field": None, "contacts": False, "touching": False}, client=2)
     viewer.leave(1)
