@@ -3,7 +3,7 @@
 pub(crate) mod compliance;
 mod coupling;
 pub(crate) mod filter;
-mod gauss_seidel;
+pub(crate) mod gauss_seidel;
 pub(crate) mod last_forces;
 mod law;
 pub(crate) mod node_compliance;

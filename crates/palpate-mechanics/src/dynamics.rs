@@ -19,6 +19,7 @@ use rayon::prelude::*;
 
 use crate::body::{BodyKind, Known, MovingBody, check_fixed_nodes, first_not_finite};
 use crate::contact::filter::{BodyView, Candidate, Detected};
+use crate::contact::gauss_seidel::Effort;
 use crate::contact::response::Response;
 use crate::contact::{Contact, ContactParameters, Surface};
 use crate::energy::{Energy, Momentum};
@@ -474,7 +475,8 @@ impl Dynamics {
         stats.times.compliance += start.elapsed();
 
         let start = Instant::now();
-        let cost = response.solve(self.threads.pool(), |body| self.body(body));
+        let effort = if stats.contact_solves == 0 { Effort::FIRST } else { Effort::AGAIN };
+        let cost = response.solve(effort, self.threads.pool(), |body| self.body(body));
         stats.iterations += cost.changes;
         stats.contact_solves += 1;
         stats.residual = cost.residual;

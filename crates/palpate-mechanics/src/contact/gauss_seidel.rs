@@ -31,15 +31,10 @@ pub(crate) struct Effort {
 }
 
 impl Effort {
-    /// For all solves of a step but the first: tissue that needs them goes on by up to a contact distance
-    /// after each.
-    pub(crate) const AGAIN: Self = Self { changes: 8.0, tolerance: 3e-2 };
-}
-
-impl Default for Effort {
-    fn default() -> Self {
-        Self { changes: 8.0, tolerance: 1e-4 }
-    }
+    /// For the first solve of a step: the only one of bodies at rest.
+    pub(crate) const FIRST: Self = Self { changes: 8.0, tolerance: 1e-4 };
+    /// For the others: tissue that needs them goes on by up to a contact distance after each.
+    pub(crate) const AGAIN: Self = Self { tolerance: 3e-2, ..Self::FIRST };
 }
 
 /// What a solution took.

@@ -40,8 +40,6 @@ pub(crate) struct Response {
     last: LastForces,
     /// Forces found so far in this step, where the solve begins.
     guess: LastForces,
-    /// Whether this is not the first solve of the step.
-    is_again: bool,
 }
 
 impl Response {
@@ -87,7 +85,6 @@ impl Response {
             close
         });
         self.guess.clone_from(&self.last);
-        self.is_again = false;
         self.problem.collect(&self.candidates, body_count, &body);
         std::mem::swap(&mut self.contacts, &mut self.contacts_before);
         self.contacts.clear();
@@ -116,7 +113,6 @@ impl Response {
         body: impl Fn(usize) -> &'a MovingBody,
     ) {
         self.guess.restore(&self.forces);
-        self.is_again = true;
         self.problem.collect(&self.candidates, body_count, &body);
         self.contacts.clear();
     }
@@ -147,6 +143,7 @@ impl Response {
     /// Solves for the forces of the candidates; every compliance column must be prepared.
     pub(crate) fn solve<'a>(
         &mut self,
+        effort: Effort,
         pool: Option<&rayon::ThreadPool>,
         body: impl Fn(usize) -> &'a MovingBody + Sync,
     ) -> SolveCost {
@@ -160,7 +157,6 @@ impl Response {
             let force = known.of(&candidates[index]).map_or([0.0; 3], |known| known.force);
             problem.blocks()[index].axes.transpose() * DVec3::from_array(force)
         };
-        let effort = if self.is_again { Effort::AGAIN } else { Effort::default() };
         let cost = self.solver.solve(problem, candidates, effort, guess);
         self.report(body);
         cost
