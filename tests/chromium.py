@@ -123,8 +123,8 @@ class Page:
         assert "exceptionDetails" not in result, result["exceptionDetails"]
         return result["result"].get("value")
 
-    def wait(self, condition, seconds=20):
-        """Wait until an expression is true."""
+    def wait(self, condition, seconds=60):
+        """Wait until an expression is true: long, since only a failure or a busy machine needs it."""
         deadline = time.monotonic() + seconds
         while not self.run(f"Boolean({condition})"):
             assert time.monotonic() < deadline, f"never true: {condition}\n{self.problems}"

@@ -260,8 +260,9 @@ def test_a_stroke_while_it_plays_opens_without_a_stall(page):
     for step in range(12):
         page.mouse("mouseMoved", x - 110 + 20 * step, y + step)
     page.mouse("mouseReleased", x + 110, y + 11)
-    page.wait(f"palpate.stage.triangleCount > {triangles}")
+    # Notices stay for seconds only.
     page.wait("/cm² cut.*beside the steps/.test(document.getElementById('toasts').textContent)")
+    page.wait(f"palpate.stage.triangleCount > {triangles}")
     assert page.run("palpate.state.playing") is True
     page.wait("palpate.last.header.version === palpate.version")
     page.wait("palpate.state.undo === 1")

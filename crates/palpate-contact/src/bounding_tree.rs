@@ -47,7 +47,7 @@ const _: () = assert!(size_of::<TreeNode>() == 64);
 ///
 /// The shape is fixed by the positions at construction; [`BoundingTree::refit`] moves the boxes, and a
 /// cut changes which elements the leaves hold, never the leaves.
-/// Source: spec/paper, "The binary tree, built in two steps".
+/// Source: Sakamoto, Nagasaka and Ogata, A Fast Collision Detection for Deformable Objects: the tree in two steps.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BoundingTree {
     nodes: Vec<TreeNode>,

@@ -26,7 +26,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-pub mod bounding_tree;
+mod bounding_tree;
 mod error;
 mod frame;
 mod leaf_pairs;
@@ -36,7 +36,7 @@ mod method;
 mod nearest;
 mod neighbours;
 mod options;
-pub mod pairs;
+mod pairs;
 mod penetration;
 mod points;
 mod proximity;
@@ -44,11 +44,11 @@ mod results;
 mod scene;
 mod simd;
 mod surface;
-pub mod threads;
+mod threads;
 mod upper_tree;
 mod wide;
 
-pub use bounding_tree::{BoundingTree, Split, TreeDefect, TreeStats};
+pub use bounding_tree::{BoundingTree, Split, TreeDefect, TreeNode, TreeStats};
 pub use error::SceneError;
 pub use memory::DetectionMemory;
 pub use method::Method;
