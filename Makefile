@@ -12,7 +12,7 @@ export PROPTEST_RNG_SEED ?= 1
 export HYPOTHESIS_PROFILE ?= fixed
 
 .DEFAULT_GOAL := help
-.PHONY: help install run view test test-rust test-python bits kills soak soak-mechanics fuzz lint deny format bench docs wheel crates models three clean
+.PHONY: help install run view test test-rust test-python bits miri sanitize kills soak soak-mechanics fuzz lint deny format bench docs wheel crates models three clean
 
 help: ## Show this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /\1\t/' | expand -t 14
@@ -50,6 +50,13 @@ bits: ## The same bits in a release and in a debug build
 	rm -f target/bits
 	PALPATE_BITS=$(abspath target)/bits cargo test --release --locked -p palpate --test bits
 	PALPATE_BITS=$(abspath target)/bits cargo test --locked -p palpate --test bits
+
+miri: ## Interpret the SIMD file and look for undefined behaviour (needs a nightly compiler with Miri)
+	RUSTFLAGS=-Ctarget-feature=+avx2 cargo +nightly miri test --locked -p palpate-contact --lib simd
+
+sanitize: ## Test detection and the solver with AddressSanitizer (needs a nightly compiler)
+	RUSTFLAGS=-Zsanitizer=address cargo +nightly test --release --locked --target x86_64-unknown-linux-gnu \
+		-p palpate-contact -p palpate-solver --lib --test detection --test against_dense
 
 kills: $(VENV)/.tools ## Kill every command a hundred times at random
 	PALPATE_KILLS=100 $(BIN)/python -m pytest tests/test_interruption.py
