@@ -124,7 +124,7 @@ class Page:
         return result["result"].get("value")
 
     def wait(self, condition, seconds=60):
-        """Wait until an expression is true: long, since only a failure or a busy machine needs it."""
+        """Wait until an expression is true; it takes long on a busy machine only, or in vain."""
         deadline = time.monotonic() + seconds
         while not self.run(f"Boolean({condition})"):
             assert time.monotonic() < deadline, f"never true: {condition}\n{self.problems}"

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import palpate
+from palpate.viewer import NullViewer
 
 hypothesis.settings.register_profile("fixed", derandomize=True)
 hypothesis.settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "default"))
@@ -54,3 +55,9 @@ def organs():
     """Folder of real organ meshes, or None where there are none."""
     folder = os.environ.get("PALPATE_DATA")
     return Path(folder) / "organs" if folder else None
+
+
+@pytest.fixture
+def viewer():
+    """The session of the small model, without a browser."""
+    return NullViewer(palpate.Simulation("small"))

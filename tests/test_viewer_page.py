@@ -257,7 +257,7 @@ def test_a_stroke_while_it_plays_opens_without_a_stall(page):
     page.mouse("mousePressed", x - 110, y)
     for step in range(12):
         page.mouse("mouseMoved", x - 110 + 20 * step, y + step)
-    # Begun only now: on a busy machine the bodies would have gone elsewhere by the time of the stroke.
+    # Only now, since on a busy machine the bodies would be elsewhere before the stroke is drawn.
     page.key(" ")
     page.wait("palpate.state.playing === true")
     page.mouse("mouseReleased", x + 110, y + 11)

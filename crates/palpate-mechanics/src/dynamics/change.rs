@@ -5,7 +5,8 @@ use std::sync::Arc;
 use palpate_geometry::Point;
 use palpate_model::{MeshChange, Model};
 
-use super::{Dynamics, attach, check_orders};
+use super::states::check_orders;
+use super::{Dynamics, attach};
 use crate::body::{BodyBasis, Known, MovingBody};
 use crate::contact::node_compliance::NodeCompliance;
 use crate::contact::{ContactParameters, Surface};
