@@ -3,14 +3,17 @@
 //! Text -> tokens -> [`Document`] (what the text says, checked) -> [`crate::Model`] (meshes loaded
 //! and placed). The language is described by example in docs/language.md.
 
+mod brackets;
 mod diagnostic;
 mod document;
 mod elements;
 mod lexer;
 mod load;
+mod motion;
 mod near;
 mod parser;
 mod text;
+mod values;
 
 pub use crate::body::MaterialEntries;
 pub use diagnostic::{Diagnostic, ModelError, Span};
