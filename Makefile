@@ -12,7 +12,7 @@ export PROPTEST_RNG_SEED ?= 1
 export HYPOTHESIS_PROFILE ?= fixed
 
 .DEFAULT_GOAL := help
-.PHONY: help install run view test test-rust test-python bits miri sanitize kills soak soak-mechanics fuzz lint deny format bench docs wheel crates models three clean
+.PHONY: help install run view test test-rust test-python bits miri sanitize kills soak soak-mechanics fuzz lint licences deny format bench docs wheel crates models three clean
 
 help: ## Show this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /\1\t/' | expand -t 14
@@ -89,6 +89,10 @@ lint: $(VENV)/.tools ## Check format, clippy, rustdoc, ruff and types
 	$(BIN)/ruff check python tests examples docs
 	$(BIN)/mypy
 	$(BIN)/python -m mypy.stubtest palpate._core
+
+licences: ## Write the notices of what is linked (needs cargo-about: cargo install cargo-about --features cli)
+	cargo about generate --offline --locked --fail -m crates/palpate-python/Cargo.toml about.hbs \
+		-o LICENSE-THIRD-PARTY
 
 deny: ## Check licences and advisories of what is linked (needs cargo-deny and the network)
 	cargo deny --locked check

@@ -85,3 +85,16 @@ def test_one_version_everywhere():
     rust = re.search(r'^rust-version = "([^"]+)"$', workspace, re.MULTILINE)[1]
     for page in ("README.md", "CONTRIBUTING.md", "docs/installation.md", ".ci/run"):
         assert re.search(rf"\b{re.escape(rust)}\b", (ROOT / page).read_text("utf-8")), page
+
+
+def test_notices_are_of_what_is_linked():
+    lock = (ROOT / "Cargo.lock").read_text("utf-8")
+    locked = set(re.findall(r'^name = "([^"]+)"\nversion = "([^"]+)"$', lock, re.MULTILINE))
+    notices = (ROOT / "LICENSE-THIRD-PARTY").read_text("utf-8")
+    named = set(re.findall(r"^  ([\w-]+) (\d[\w.+-]*)$", notices, re.MULTILINE))
+    assert named <= locked, "`make licences` writes them anew"
+    for crate in set(ALLOWED) - {"palpate-testing", "palpate-fuzz"}:
+        manifest = (ROOT / "crates" / crate / "Cargo.toml").read_text("utf-8")
+        section = manifest.split("[dependencies]")[1].split("\n[")[0]
+        used = set(re.findall(r"^([a-z][\w-]*)\b", section, re.MULTILINE))
+        assert used <= {name for name, _ in named}, crate
