@@ -1,4 +1,4 @@
-"""Shared meshes."""
+"""What several files of tests share."""
 
 import os
 from pathlib import Path
