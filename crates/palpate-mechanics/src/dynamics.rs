@@ -283,17 +283,22 @@ impl Dynamics {
         &mut self.tasks[task as usize][place as usize]
     }
 
+    /// Runs `work` for the bodies of every task.
+    fn for_each_task(&mut self, work: impl Fn(&mut Vec<MovingBody>) + Sync) {
+        match self.threads.pool() {
+            Some(pool) => pool.install(|| self.tasks.par_iter_mut().for_each(&work)),
+            None => self.tasks.iter_mut().for_each(&work),
+        }
+    }
+
     /// Runs `work(index, body)` for every body, the bodies of one task in turn.
     fn for_each_body(&mut self, work: impl Fn(usize, &mut MovingBody) + Sync) {
-        let run = |task: &mut Vec<MovingBody>| {
-            for body in task {
-                work(body.index, body);
-            }
-        };
-        match self.threads.pool() {
-            Some(pool) => pool.install(|| self.tasks.par_iter_mut().for_each(run)),
-            None => self.tasks.iter_mut().for_each(run),
-        }
+        self.for_each_task(|task| task.iter_mut().for_each(|body| work(body.index, body)));
+    }
+
+    /// The same, the last ones first: caches still hold what was read of those.
+    fn for_each_body_back(&mut self, work: impl Fn(usize, &mut MovingBody) + Sync) {
+        self.for_each_task(|task| task.iter_mut().rev().for_each(|body| work(body.index, body)));
     }
 
     /// Solves ahead for the response of each body to contact, up to `nodes` surface nodes per body;
@@ -403,7 +408,7 @@ impl Dynamics {
             self.solve_contacts(response, &mut stats);
             let start = Instant::now();
             self.set_contact_forces(response.forces());
-            self.for_each_body(|_, body| body.advance(time_step));
+            self.for_each_body_back(|_, body| body.advance(time_step));
             let missed = response.take_missed(|body| self.body(body));
             let again = pass < MAX_PASSES && (self.improve() || missed);
             if again {

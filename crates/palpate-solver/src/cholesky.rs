@@ -10,6 +10,7 @@ mod half;
 mod memory;
 mod multifrontal;
 mod packed;
+mod pages;
 mod probe;
 mod real;
 mod stored;
@@ -22,7 +23,7 @@ use block_float::BlockFloat;
 use changes::{Contribution, Kept, Older, Plan};
 pub use half::{HalfSolution, half_products, half_products_between};
 use half::{HalfWorkspace, NODES, Paths};
-use memory::{Memory, SharedMemory, Spare};
+use memory::{Memory, SharedMemory};
 use packed::{PackedFactor, PackedWorkspace, Panel};
 use probe::Probe;
 use stored::Stored;
@@ -145,11 +146,10 @@ enum Packed {
 trait Kind: Stored {
     fn of(packed: &Packed) -> Option<&PackedFactor<Self>>;
     fn packed(factor: PackedFactor<Self>) -> Packed;
-    fn spare(memory: &mut Memory) -> &mut Spare<Self>;
 }
 
 macro_rules! kind {
-    ($stored:ty, $variant:ident, $spare:ident) => {
+    ($stored:ty, $variant:ident) => {
         impl Kind for $stored {
             fn of(packed: &Packed) -> Option<&PackedFactor<Self>> {
                 if let Packed::$variant(factor) = packed { Some(factor) } else { None }
@@ -158,17 +158,13 @@ macro_rules! kind {
             fn packed(factor: PackedFactor<Self>) -> Packed {
                 Packed::$variant(factor)
             }
-
-            fn spare(memory: &mut Memory) -> &mut Spare<Self> {
-                &mut memory.$spare
-            }
         }
     };
 }
 
-kind!(BlockFloat, BlockFloat, block_float);
-kind!(Panel<f32>, Single, single);
-kind!(Panel<f64>, Double, double);
+kind!(BlockFloat, BlockFloat);
+kind!(Panel<f32>, Single);
+kind!(Panel<f64>, Double);
 
 impl Default for Packed {
     fn default() -> Self {
@@ -375,16 +371,15 @@ impl Cholesky {
         let known = change.and_then(|change| Some((change, K::of(&change.older.packed)?)));
         let mut plan = self.plan(known, keeps);
         self.computed = plan.computed_count();
-        let mut panels = std::mem::take(K::spare(memory));
-        let Memory { fronts, contributions, .. } = memory;
+        let Memory { fronts, contributions, panels, .. } = memory;
         let packed = fronts
-            .factor(&self.supernodes, matrix, &mut plan, &mut panels, contributions)
+            .factor(&self.supernodes, matrix, &mut plan, panels, contributions)
             .map_err(|place| self.not_positive(place))?;
         Ok((K::packed(packed), plan.into_kept()))
     }
 
     /// What to compute where the columns of the changed factor are `known`.
-    fn plan<'a, P>(
+    fn plan<'a, P: Stored>(
         &self,
         known: Option<(&Change<'a>, &'a PackedFactor<P>)>,
         keeps: bool,
@@ -403,11 +398,11 @@ impl Cholesky {
         let shared = self.memory.clone();
         let Some(mut memory) = shared.try_lock() else { return };
         let memory = &mut *memory;
-        match &mut self.packed {
-            Packed::BlockFloat(packed) => packed.clear(&mut memory.block_float),
-            Packed::Single(packed) => packed.clear(&mut memory.single),
-            Packed::Double(packed) => packed.clear(&mut memory.double),
-        }
+        memory.give_panels(match std::mem::take(&mut self.packed) {
+            Packed::BlockFloat(packed) => packed.into_pages(),
+            Packed::Single(packed) => packed.into_pages(),
+            Packed::Double(packed) => packed.into_pages(),
+        });
         if let Some(kept) = self.kept.take() {
             for contribution in kept.contributions.into_iter().flatten() {
                 memory.contributions.give(contribution);

@@ -4,6 +4,7 @@
 //! An entry is `scale (m - 1.5)`, where m in [1, 2) is a number whose mantissa begins with the sixteen bits: it
 //! takes a shift and a mask to have it as an f32. The 1.5 are put right once per panel and not per entry.
 
+use bytemuck::{Pod, Zeroable};
 use pulp::Simd;
 
 use super::packed::{LANES, Panel, ROWS};
@@ -25,7 +26,7 @@ const BEYOND: u32 = 7;
 const HALF_STEP: u32 = 1 << (BEYOND - 1);
 
 /// A column of a panel.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct BlockFloat {
     words: [u32; WORDS],

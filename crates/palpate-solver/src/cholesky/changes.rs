@@ -8,7 +8,8 @@
 
 use std::sync::Arc;
 
-use super::packed::{PackedFactor, Supernode};
+use super::packed::PackedFactor;
+use super::stored::Stored;
 use super::supernodes::Supernodes;
 use super::tiles::Column;
 use crate::block_matrix::{Block, BlockMatrix};
@@ -123,15 +124,15 @@ fn has_same_bits(a: &Block, b: &Block) -> bool {
 
 /// What a factorisation takes over and what it keeps, by supernode.
 pub(super) struct Plan<'a, P> {
-    /// Its pieces, if they are known.
-    pub(super) known: Vec<Option<&'a [Supernode<P>]>>,
+    /// The panels of its pieces, if they are known.
+    pub(super) known: Vec<Option<&'a [P]>>,
     pub(super) is_computed: Vec<bool>,
     pub(super) is_kept: Vec<bool>,
     /// Known to begin with, and those that are kept.
     pub(super) contributions: Vec<Option<Contribution>>,
 }
 
-impl<'a, P> Plan<'a, P> {
+impl<'a, P: Stored> Plan<'a, P> {
     /// Everything is computed and nothing is kept.
     pub(super) fn whole(supernodes: &Supernodes) -> Self {
         let count = supernodes.count();
@@ -157,7 +158,7 @@ impl<'a, P> Plan<'a, P> {
     ) -> Self {
         let mut plan = Self::keeping(supernodes);
         for (s, &twin) in twins.iter().enumerate().filter(|&(_, &twin)| twin != NONE) {
-            plan.known[s] = Some(&factor.supernodes[older.supernodes.pieces(twin as usize)]);
+            plan.known[s] = Some(factor.panels_of(older.supernodes.pieces(twin as usize)));
             plan.contributions[s].clone_from(&older.kept.contributions[twin as usize]);
         }
         for s in (0..supernodes.count()).rev() {

@@ -334,7 +334,7 @@ impl<P: Stored> pulp::WithSimd for HalfPass<'_, P> {
         for &s in &work.path {
             let supernode = &factor.supernodes[s as usize];
             let row_count = supernode.row_count();
-            let mut panels = &supernode.panels[..];
+            let mut panels = factor.panels_of(s as usize..s as usize + 1);
             let top = &work.x[supernode.columns()];
             for first in (0..row_count).step_by(ROWS) {
                 let (panel, rest) = panels.split_at(top.len().min(first + ROWS));
@@ -357,10 +357,13 @@ impl<P: Stored> pulp::WithSimd for HalfPass<'_, P> {
             }
             let (rows_top, rows_below) = work.rows.split_at(supernode.columns().len());
             work.x[supernode.columns()].copy_from_slice(rows_top);
-            for (&row, value) in factor.pattern[supernode.pattern()].iter().zip(rows_below) {
-                let x = &mut work.x[row as usize][..padded];
-                for (x, &value) in x.iter_mut().zip(value) {
-                    *x -= value;
+            let x_nodes = work.x.as_chunks_mut::<3>().0;
+            let nodes = &factor.nodes_below[supernode.nodes_below()];
+            for (&node, values) in nodes.iter().zip(rows_below.as_chunks::<3>().0) {
+                for (x, values) in x_nodes[node as usize].iter_mut().zip(values) {
+                    for (x, &value) in x[..padded].iter_mut().zip(values) {
+                        *x -= value;
+                    }
                 }
             }
         }

@@ -2,9 +2,8 @@
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
 
-use super::block_float::BlockFloat;
 use super::multifrontal::Fronts;
-use super::packed::Panel;
+use super::pages::Pages;
 use super::probe::ProbeMemory;
 use super::tiles::Column;
 
@@ -18,9 +17,7 @@ pub(super) struct Memory {
     pub(super) fronts: Fronts,
     pub(super) probe: ProbeMemory,
     pub(super) contributions: Spare<Column>,
-    pub(super) block_float: Spare<BlockFloat>,
-    pub(super) single: Spare<Panel<f32>>,
-    pub(super) double: Spare<Panel<f64>>,
+    pub(super) panels: Pages,
 }
 
 impl SharedMemory {
@@ -45,12 +42,17 @@ impl SharedMemory {
 }
 
 impl Memory {
+    /// Takes the memory of a factor back, or leaves it to the system if there is as much already.
+    pub(super) fn give_panels(&mut self, panels: Pages) {
+        if panels.size() > self.panels.size() {
+            self.panels = panels;
+        }
+    }
+
     /// Gives back to the system what no factor has taken.
     pub(super) fn trim(&mut self) {
         self.contributions.0.clear();
-        self.block_float.0.clear();
-        self.single.0.clear();
-        self.double.0.clear();
+        self.panels = Pages::default();
     }
 }
 

@@ -15,6 +15,7 @@ use super::finish::{Finish, Piece};
 use super::front::{Front, Shape};
 use super::memory::Spare;
 use super::packed::PackedFactor;
+use super::pages::Pages;
 use super::stored::Stored;
 use super::supernodes::Supernodes;
 use super::tiles::{Block, Column};
@@ -64,14 +65,14 @@ impl Fronts {
         supernodes: &Supernodes,
         matrix: &BlockMatrix,
         plan: &mut Plan<P>,
-        spare: &mut Spare<P>,
+        spare_panels: &mut Pages,
         spare_contributions: &mut Spare<Column>,
     ) -> Result<PackedFactor<P>, usize> {
         let (mut finish, mut panel_memory) = (Finish::default(), Vec::new());
         for stack in &mut self.stacks {
             stack.used = 0;
         }
-        let mut factor = PackedFactor::new(3 * matrix.pattern().node_count());
+        let mut factor = PackedFactor::new(supernodes, std::mem::take(spare_panels));
         for s in 0..supernodes.count() {
             let shape = shape(supernodes, s);
             let first = 3 * supernodes.nodes(s).start;
@@ -82,23 +83,19 @@ impl Fronts {
                     .eliminate(supernodes, matrix, s, plan, kept)
                     .map_err(|column| first + column)?;
             }
+            let pieces = supernodes.pieces(s);
+            if let Some(known) = plan.known[s] {
+                factor.panels_of_mut(pieces).copy_from_slice(known);
+                continue;
+            }
             let mut begin = 0;
-            for (index, nodes) in supernodes.piece_nodes(s).enumerate() {
-                let piece = Piece::new(shape, begin, 3 * nodes.len());
+            for index in pieces {
+                let piece = Piece::new(shape, begin, factor.supernodes[index].columns().len());
                 begin += piece.shape.width;
-                let panels = if let Some(pieces) = plan.known[s] {
-                    Arc::clone(&pieces[index].panels)
-                } else {
-                    let mut panels = spare.take(piece.shape.panel_count(), P::ZERO);
-                    P::fill(&mut panels, &mut panel_memory, |panels| {
-                        finish.finish(shape, piece, &self.columns, &self.inverses, panels);
-                    });
-                    Arc::new(panels)
-                };
-                let own = nodes.end as u32..supernodes.nodes(s).end as u32;
-                let rows = own.chain(supernodes.rows(s).iter().copied());
-                let rows = rows.flat_map(|row| [0, 1, 2].map(|k| 3 * row + k));
-                factor.push(3 * nodes.start as u32, piece.shape.width, rows, panels);
+                let panels = factor.panels_of_mut(index..index + 1);
+                P::fill(panels, &mut panel_memory, |panels| {
+                    finish.finish(shape, piece, &self.columns, &self.inverses, panels);
+                });
             }
         }
         Ok(factor)

@@ -9,13 +9,17 @@
 //! P lies in panels of [`ROWS`] rows, column after column, without the columns that are zero in the
 //! whole panel. A solve is bound by reading it once per pass, so that single precision halves its time.
 
-use std::sync::Arc;
+use std::marker::PhantomData;
+use std::ops::Range;
 
+use bytemuck::{Pod, Zeroable};
 use pulp::Simd;
 
-use super::memory::Spare;
+use super::front::Shape;
+use super::pages::Pages;
 use super::real::Real;
 use super::stored::Stored;
+use super::supernodes::Supernodes;
 
 /// Rows of a panel: one to eight vectors of any machine and precision.
 pub(super) const ROWS: usize = 32;
@@ -23,39 +27,49 @@ pub(super) const ROWS: usize = 32;
 pub(super) const LANES: usize = 16;
 
 /// A column of a panel as numbers.
-#[derive(Clone, Copy, Debug)]
-#[repr(C, align(64))]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(transparent)]
 pub(super) struct Panel<T>(pub(super) [T; ROWS]);
 
-#[derive(Debug)]
-pub(super) struct Supernode<P> {
+#[derive(Debug, PartialEq)]
+pub(super) struct Supernode {
     start: u32,
     width: u32,
-    pattern_start: u32,
-    pattern_end: u32,
-    /// Those of a supernode that a change has left alone are the same in both factors.
-    pub(super) panels: Arc<Vec<P>>,
+    /// Where the nodes of its rows below are among those of all.
+    first_node: u32,
+    end_node: u32,
+    /// Where its panels are among the columns of all.
+    first_panel: usize,
+    end_panel: usize,
 }
 
-impl<P> Supernode<P> {
-    pub(super) fn columns(&self) -> std::ops::Range<usize> {
+impl Supernode {
+    pub(super) fn columns(&self) -> Range<usize> {
         self.start as usize..(self.start + self.width) as usize
     }
 
-    pub(super) fn pattern(&self) -> std::ops::Range<usize> {
-        self.pattern_start as usize..self.pattern_end as usize
+    pub(super) fn panels(&self) -> Range<usize> {
+        self.first_panel..self.end_panel
+    }
+
+    pub(super) fn nodes_below(&self) -> Range<usize> {
+        self.first_node as usize..self.end_node as usize
     }
 
     pub(super) fn row_count(&self) -> usize {
-        (self.width + self.pattern_end - self.pattern_start) as usize
+        self.width as usize + 3 * self.nodes_below().len()
     }
 }
 
 /// The packed factor of one matrix.
 #[derive(Debug)]
 pub(super) struct PackedFactor<P> {
-    pub(super) supernodes: Vec<Supernode<P>>,
-    pub(super) pattern: Vec<u32>,
+    pub(super) supernodes: Vec<Supernode>,
+    /// Nodes of the rows below each supernode, by their place in the order.
+    pub(super) nodes_below: Vec<u32>,
+    /// The panels of all supernodes.
+    pages: Pages,
+    panels: PhantomData<P>,
     /// Rows and columns.
     pub(super) size: usize,
     pub(super) widest: usize,
@@ -65,7 +79,15 @@ pub(super) struct PackedFactor<P> {
 
 impl<P> Default for PackedFactor<P> {
     fn default() -> Self {
-        Self { supernodes: Vec::new(), pattern: Vec::new(), size: 0, widest: 0, longest: 0 }
+        Self {
+            supernodes: Vec::new(),
+            nodes_below: Vec::new(),
+            pages: Pages::default(),
+            panels: PhantomData,
+            size: 0,
+            widest: 0,
+            longest: 0,
+        }
     }
 }
 
@@ -79,41 +101,75 @@ pub(super) struct PackedWorkspace<T> {
 }
 
 impl<P: Stored> PackedFactor<P> {
-    /// A factor of `size` columns without any supernode.
-    pub(super) fn new(size: usize) -> Self {
-        Self { size, ..Self::default() }
+    /// The factor of some supernodes, without its numbers, in memory that may have been that of another one.
+    pub(super) fn new(supernodes: &Supernodes, spare: Pages) -> Self {
+        let mut factor = Self { size: 3 * supernodes.node_count(), ..Self::default() };
+        for s in 0..supernodes.count() {
+            for nodes in supernodes.piece_nodes(s) {
+                let own = nodes.end as u32..supernodes.nodes(s).end as u32;
+                factor.push(nodes, own.chain(supernodes.rows(s).iter().copied()));
+            }
+        }
+        factor.pages = spare.fitting(factor.panel_count() * size_of::<P>());
+        factor
     }
 
-    /// Leaves its panels as memory.
-    pub(super) fn clear(&mut self, spare: &mut Spare<P>) {
-        std::mem::take(self).supernodes.into_iter().for_each(|s| spare.give(s.panels));
-    }
-
-    /// Adds a supernode of `width` columns from `start` on: the rows of B, and the panels of P.
-    pub(super) fn push(
-        &mut self,
-        start: u32,
-        width: usize,
-        rows: impl Iterator<Item = u32>,
-        panels: Arc<Vec<P>>,
-    ) {
-        let pattern_start = self.pattern.len() as u32;
-        self.pattern.extend(rows);
+    /// Adds a supernode of some nodes, with those below it.
+    fn push(&mut self, nodes: Range<usize>, below: impl Iterator<Item = u32>) {
+        let (first_panel, first_node) = (self.panel_count(), self.nodes_below.len());
+        self.nodes_below.extend(below);
+        let width = 3 * nodes.len();
+        let shape = Shape { width, below: 3 * (self.nodes_below.len() - first_node) };
         let supernode = Supernode {
-            start,
+            start: 3 * nodes.start as u32,
             width: width as u32,
-            pattern_start,
-            pattern_end: self.pattern.len() as u32,
-            panels,
+            first_node: first_node as u32,
+            end_node: self.nodes_below.len() as u32,
+            first_panel,
+            end_panel: first_panel + shape.panel_count(),
         };
         self.widest = self.widest.max(width);
         self.longest = self.longest.max(supernode.row_count().next_multiple_of(ROWS));
         self.supernodes.push(supernode);
     }
 
+    /// Columns of all panels.
+    fn panel_count(&self) -> usize {
+        self.supernodes.last().map_or(0, |supernode| supernode.end_panel)
+    }
+
+    /// The panels of all supernodes, one after the other.
+    fn panels(&self) -> &[P] {
+        self.pages.values(self.panel_count())
+    }
+
+    /// The panels of some supernodes.
+    pub(super) fn panels_of(&self, supernodes: Range<usize>) -> &[P] {
+        &self.panels()[self.panel_range(supernodes)]
+    }
+
+    /// As [`PackedFactor::panels_of`].
+    pub(super) fn panels_of_mut(&mut self, supernodes: Range<usize>) -> &mut [P] {
+        let (count, range) = (self.panel_count(), self.panel_range(supernodes));
+        &mut self.pages.values_mut(count)[range]
+    }
+
+    fn panel_range(&self, supernodes: Range<usize>) -> Range<usize> {
+        let supernodes = &self.supernodes[supernodes];
+        match (supernodes.first(), supernodes.last()) {
+            (Some(first), Some(last)) => first.first_panel..last.end_panel,
+            _ => 0..0,
+        }
+    }
+
+    pub(super) fn into_pages(self) -> Pages {
+        self.pages
+    }
+
     pub(super) fn bytes(&self) -> usize {
-        let panels = self.supernodes.iter().map(|supernode| size_of_val(&**supernode.panels));
-        panels.sum::<usize>() + size_of_val(&*self.pattern) + size_of_val(&*self.supernodes)
+        size_of_val(self.panels())
+            + size_of_val(&*self.nodes_below)
+            + size_of_val(&*self.supernodes)
     }
 
     /// Makes the memory large enough; it is so after the first time.
@@ -184,6 +240,7 @@ impl<P: Stored> PackedFactor<P> {
     #[inline(always)]
     fn forward<S: Simd, const K: usize>(&self, simd: S, work: &mut PackedWorkspace<P::Real>) {
         let x = work.x.as_chunks_mut::<K>().0;
+        let panels = self.panels();
         for supernode in &self.supernodes {
             let width = supernode.width as usize;
             let top = &mut work.top.as_chunks_mut::<K>().0[..width];
@@ -192,7 +249,7 @@ impl<P: Stored> PackedFactor<P> {
                 continue;
             }
             let rows = work.rows.as_chunks_mut::<K>().0;
-            let mut panels = &supernode.panels[..];
+            let mut panels = &panels[supernode.panels()];
             for first in (0..supernode.row_count()).step_by(ROWS) {
                 let (panel, rest) = panels.split_at(width.min(first + ROWS));
                 panels = rest;
@@ -205,10 +262,12 @@ impl<P: Stored> PackedFactor<P> {
             }
             let (rows_top, rows_below) = rows.split_at(width);
             x[supernode.columns()].copy_from_slice(rows_top);
-            for (&row, value) in self.pattern[supernode.pattern()].iter().zip(rows_below) {
-                for k in 0..K {
-                    let x = &mut x[row as usize][k];
-                    *x -= value[k];
+            let x = x.as_chunks_mut::<3>().0;
+            let nodes = &self.nodes_below[supernode.nodes_below()];
+            for (&node, values) in nodes.iter().zip(rows_below.as_chunks::<3>().0) {
+                let x = x[node as usize].as_flattened_mut();
+                for (x, &value) in x.iter_mut().zip(values.as_flattened()) {
+                    *x -= value;
                 }
             }
         }
@@ -218,21 +277,25 @@ impl<P: Stored> PackedFactor<P> {
     #[inline(always)]
     fn backward<S: Simd, const K: usize>(&self, simd: S, work: &mut PackedWorkspace<P::Real>) {
         let x = work.x.as_chunks_mut::<K>().0;
+        let panels = self.panels();
         for supernode in self.supernodes.iter().rev() {
             let width = supernode.width as usize;
             let rows = work.rows.as_chunks_mut::<K>().0;
             rows[..width].copy_from_slice(&x[supernode.columns()]);
-            let pattern = &self.pattern[supernode.pattern()];
+            let nodes = &self.nodes_below[supernode.nodes_below()];
             let row_count = supernode.row_count();
-            for (value, &row) in rows[width..row_count].iter_mut().zip(pattern) {
-                for k in 0..K {
-                    value[k] = P::Real::ZERO - x[row as usize][k];
+            let rows_below = rows[width..row_count].as_chunks_mut::<3>().0;
+            let x_nodes = x.as_chunks::<3>().0;
+            for (values, &node) in rows_below.iter_mut().zip(nodes) {
+                let x = x_nodes[node as usize].as_flattened();
+                for (value, &x) in values.as_flattened_mut().iter_mut().zip(x) {
+                    *value = P::Real::ZERO - x;
                 }
             }
             rows[row_count..row_count.next_multiple_of(ROWS)].fill([P::Real::ZERO; K]);
             let sums = &mut work.sums[..K * width];
             sums.fill([P::Real::ZERO; LANES]);
-            let mut panels = &supernode.panels[..];
+            let mut panels = &panels[supernode.panels()];
             for first in (0..row_count).step_by(ROWS) {
                 let (panel, rest) = panels.split_at(width.min(first + ROWS));
                 panels = rest;
@@ -247,11 +310,28 @@ impl<P: Stored> PackedFactor<P> {
             }
             for (value, sums) in x[supernode.columns()].iter_mut().zip(sums.as_chunks::<K>().0) {
                 for k in 0..K {
-                    value[k] = sums[k].iter().fold(P::Real::ZERO, |sum, &part| sum + part);
+                    value[k] = total(simd, &sums[k]);
                 }
             }
         }
     }
+}
+
+/// The sum of all lanes: half of them and the other half are added until one is left.
+#[allow(clippy::inline_always)] // compiled for the vector unit of the caller
+#[inline(always)]
+fn total<S: Simd, T: Real>(simd: S, lanes: &[T; LANES]) -> T {
+    let vectors = T::vectors::<S>(lanes);
+    let mut sums = [vectors[0]; LANES];
+    sums[..vectors.len()].copy_from_slice(vectors);
+    let mut half = vectors.len() / 2;
+    while half > 0 {
+        for i in 0..half {
+            sums[i] = T::plus(simd, sums[i], sums[i + half]);
+        }
+        half /= 2;
+    }
+    T::total(simd, sums[0])
 }
 
 /// Both passes of a solve, for the vector unit that the machine has.

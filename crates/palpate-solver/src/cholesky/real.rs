@@ -2,11 +2,12 @@
 
 use std::ops::{Add, Sub, SubAssign};
 
+use bytemuck::Pod;
 use pulp::Simd;
 
 /// A floating-point number and its vectors.
 pub(super) trait Real:
-    Copy + Default + PartialEq + Add<Output = Self> + Sub<Output = Self> + SubAssign
+    Pod + Default + PartialEq + Add<Output = Self> + Sub<Output = Self> + SubAssign
 {
     const ZERO: Self;
 
@@ -24,13 +25,26 @@ pub(super) trait Real:
         b: Self::Vector<S>,
         c: Self::Vector<S>,
     ) -> Self::Vector<S>;
+    fn plus<S: Simd>(simd: S, a: Self::Vector<S>, b: Self::Vector<S>) -> Self::Vector<S>;
+    /// The sum of the lanes: half of them and the other half are added until one is left, whatever the machine.
+    fn total<S: Simd>(simd: S, a: Self::Vector<S>) -> Self;
     /// The values as whole vectors.
     fn vectors<S: Simd>(values: &[Self]) -> &[Self::Vector<S>];
     fn vectors_mut<S: Simd>(values: &mut [Self]) -> &mut [Self::Vector<S>];
 }
 
 macro_rules! real {
-    ($type:ty, $vector:ident, $lanes:ident, $splat:ident, $mul_add:ident, $as:ident, $as_mut:ident) => {
+    (
+        $type:ty,
+        $vector:ident,
+        $lanes:ident,
+        $splat:ident,
+        $mul_add:ident,
+        $add:ident,
+        $total:ident,
+        $as:ident,
+        $as_mut:ident
+    ) => {
         #[allow(clippy::inline_always)] // compiled for the vector unit of the caller
         #[allow(
             clippy::cast_possible_truncation,
@@ -73,6 +87,16 @@ macro_rules! real {
             }
 
             #[inline(always)]
+            fn plus<S: Simd>(simd: S, a: S::$vector, b: S::$vector) -> S::$vector {
+                simd.$add(a, b)
+            }
+
+            #[inline(always)]
+            fn total<S: Simd>(simd: S, a: S::$vector) -> $type {
+                simd.$total(a)
+            }
+
+            #[inline(always)]
             fn vectors<S: Simd>(values: &[Self]) -> &[S::$vector] {
                 S::$as(values).0
             }
@@ -85,5 +109,25 @@ macro_rules! real {
     };
 }
 
-real!(f32, f32s, F32_LANES, splat_f32s, mul_add_f32s, as_simd_f32s, as_mut_simd_f32s);
-real!(f64, f64s, F64_LANES, splat_f64s, mul_add_f64s, as_simd_f64s, as_mut_simd_f64s);
+real!(
+    f32,
+    f32s,
+    F32_LANES,
+    splat_f32s,
+    mul_add_f32s,
+    add_f32s,
+    reduce_sum_f32s,
+    as_simd_f32s,
+    as_mut_simd_f32s
+);
+real!(
+    f64,
+    f64s,
+    F64_LANES,
+    splat_f64s,
+    mul_add_f64s,
+    add_f64s,
+    reduce_sum_f64s,
+    as_simd_f64s,
+    as_mut_simd_f64s
+);

@@ -1,12 +1,13 @@
 //! How the columns of panels are stored, and the two products of a solve with them.
 
+use bytemuck::Pod;
 use pulp::Simd;
 
 use super::packed::{LANES, Panel, ROWS};
 use super::real::Real;
 
 /// A column of a panel as it is stored.
-pub(super) trait Stored: Copy {
+pub(super) trait Stored: Pod {
     /// What is calculated with.
     type Real: Real;
 

@@ -188,6 +188,10 @@ impl Supernodes {
         self.pieces(s).start + (node - self.nodes(s).start) / PIECE
     }
 
+    pub(super) fn node_count(&self) -> usize {
+        self.of_node.len()
+    }
+
     fn row_range(&self, s: usize) -> std::ops::Range<usize> {
         self.row_starts[s] as usize..self.row_starts[s + 1] as usize
     }

@@ -6,9 +6,7 @@ use std::sync::Arc;
 use palpate_testing::{Fastest, Random, box_of_cells};
 use proptest::prelude::*;
 
-use crate::cholesky::packed::Panel;
-use crate::cholesky::packed::{PackedFactor, Supernode};
-use crate::cholesky::real::Real;
+use crate::cholesky::packed::PackedFactor;
 use crate::cholesky::stored::Stored;
 use crate::cholesky::{Cholesky, FactorError, HalfSolution, Packed, Precision};
 use crate::{BlockMatrix, BlockPattern, NodeOrder};
@@ -207,16 +205,10 @@ fn grid(n: usize) -> Mesh {
 }
 
 fn same_bits<P: Stored>(a: &PackedFactor<P>, b: &PackedFactor<P>) -> bool {
-    let entries = |s: &Supernode<P>| -> Vec<u64> {
-        let mut memory = vec![Panel::<P::Real>::ZERO; P::memory_columns(s.panels.len())];
-        let panels = P::panel(&s.panels, &mut memory);
-        panels.iter().flat_map(|panel| panel.0).map(|x| x.to_f64().to_bits()).collect()
+    let bytes = |factor: &PackedFactor<P>| -> Vec<u8> {
+        bytemuck::cast_slice(factor.panels_of(0..factor.supernodes.len())).to_vec()
     };
-    a.pattern == b.pattern
-        && a.supernodes.len() == b.supernodes.len()
-        && a.supernodes.iter().zip(&b.supernodes).all(|(a, b)| {
-            a.columns() == b.columns() && a.pattern() == b.pattern() && entries(a) == entries(b)
-        })
+    a.nodes_below == b.nodes_below && a.supernodes == b.supernodes && bytes(a) == bytes(b)
 }
 
 fn assert_same(changed: &Cholesky, fresh: &Cholesky) {
