@@ -8,6 +8,7 @@ use std::time::Instant;
 use palpate_cutting::{Blade, Cut, CutOptions, cut, cut_on};
 use palpate_geometry::{Point, vec3};
 use palpate_model::{Mesh, ReadOptions, read_mesh};
+use palpate_testing::Random;
 
 /// Blades of each kind.
 const BLADES: usize = 60;
@@ -114,7 +115,9 @@ fn median_and_most(mut values: Vec<f64>) -> [f64; 2] {
 /// Whole planes through the middle half of the mesh, in all directions.
 fn planes(mesh: &Mesh) -> Result<Vec<Blade>, Box<dyn Error>> {
     let mut random = Random(1);
-    (0..BLADES).map(|_| Ok(Blade::plane(random.inside(mesh), random.point(), None)?)).collect()
+    (0..BLADES)
+        .map(|_| Ok(Blade::plane(inside(mesh, &mut random), random.vector(1.0), None)?))
+        .collect()
 }
 
 /// Strokes along bent lines: 40 steps, 30 % of the body's size deep and 60 % long.
@@ -122,8 +125,8 @@ fn strokes(mesh: &Mesh) -> Result<Vec<Blade>, Box<dyn Error>> {
     let mut random = Random(2);
     let size = vec3::norm(mesh.bounds().extent());
     let stroke = |_| {
-        let middle = random.inside(mesh);
-        let [along, depth] = [random.point(), random.point()]
+        let middle = inside(mesh, &mut random);
+        let [along, depth] = [random.vector(1.0), random.vector(1.0)]
             .map(|v| vec3::normalized(v).unwrap_or([1.0, 0.0, 0.0]));
         let side = vec3::cross(along, depth);
         let edge = |k: i32| {
@@ -137,21 +140,7 @@ fn strokes(mesh: &Mesh) -> Result<Vec<Blade>, Box<dyn Error>> {
     (0..BLADES).map(stroke).collect()
 }
 
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> f64 {
-        self.0 =
-            self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 33) as f64 / f64::from(1_u32 << 30) - 1.0
-    }
-
-    fn point(&mut self) -> Point {
-        [self.next(), self.next(), self.next()]
-    }
-
-    fn inside(&mut self, mesh: &Mesh) -> Point {
-        let (center, extent) = (mesh.bounds().center(), mesh.bounds().extent());
-        std::array::from_fn(|axis| center[axis] + 0.25 * extent[axis] * self.next())
-    }
+fn inside(mesh: &Mesh, random: &mut Random) -> Point {
+    let (center, extent) = (mesh.bounds().center(), mesh.bounds().extent());
+    std::array::from_fn(|axis| center[axis] + extent[axis] * random.between(-0.25, 0.25))
 }

@@ -12,6 +12,7 @@ use palpate::{
     Blade, CoreLoader, CutOptions, Mesh, Scene, SceneCuts, SceneOptions, Simulation,
     SimulationOptions, load_model,
 };
+use palpate_testing::Random;
 
 /// [m]
 const CLOSE: f64 = 0.0001;
@@ -22,20 +23,6 @@ const EVERY: IntersectionOptions =
 /// After so many cuts the loops are run; `PALPATE_CUTS=1` after every one.
 fn compared_every() -> usize {
     std::env::var("PALPATE_CUTS").map_or(20, |text| text.parse().expect("a number"))
-}
-
-struct Random(u64);
-
-impl Random {
-    fn below(&mut self, end: usize) -> usize {
-        self.0 =
-            self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 33) as usize % end
-    }
-
-    fn vector(&mut self, size: f64) -> Point {
-        [0; 3].map(|_| size * (2.0 * self.below(1 << 20) as f64 / f64::from(1 << 20) - 1.0))
-    }
 }
 
 /// A square of some centimetres, or a stroke that goes on from one place to the next.

@@ -10,7 +10,7 @@ use crate::frame::SceneBody;
 
 /// What is known of a node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Side {
+enum Location {
     /// Not located, and no matter unless its neighbours turn out to be inside.
     Unknown,
     /// Of a crossing triangle, not located yet; in its own body, a node that cannot be located.
@@ -22,7 +22,7 @@ enum Side {
 /// The nodes of a body that are inside. Keeps its memory.
 #[derive(Debug, Default)]
 pub(super) struct Inside {
-    sides: Vec<Side>,
+    sides: Vec<Location>,
     /// By triangle.
     crosses: Vec<bool>,
     /// By the smallest node of a component.
@@ -59,15 +59,15 @@ impl Inside {
         self.begin(body, crossing);
         for index in 0..self.border.len() {
             let node = self.border[index];
-            if self.sides[node as usize] == Side::Border {
-                let side = if is_inside(node) { Side::Inside } else { Side::Outside };
+            if self.sides[node as usize] == Location::Border {
+                let side = if is_inside(node) { Location::Inside } else { Location::Outside };
                 self.spread(body, node, side);
             }
         }
         for &node in &body.surface.component_nodes {
             if !self.component_crosses[node as usize] && is_inside(node) {
                 let before = self.nodes.len();
-                self.spread(body, node, Side::Inside);
+                self.spread(body, node, Location::Inside);
                 self.swallowed.extend(self.nodes.drain(before..).map(|inside| (node, inside)));
             }
         }
@@ -79,7 +79,7 @@ impl Inside {
     fn begin(&mut self, body: &SceneBody, crossing: impl Iterator<Item = u32>) {
         let (triangles, surface) = (body.mesh.triangles(), &body.surface);
         let node_count = body.mesh.nodes().len();
-        reset(&mut self.sides, node_count, Side::Unknown);
+        reset(&mut self.sides, node_count, Location::Unknown);
         reset(&mut self.crosses, triangles.len(), false);
         reset(&mut self.component_crosses, node_count, false);
         self.border.clear();
@@ -92,7 +92,8 @@ impl Inside {
             let nodes = triangles[triangle as usize];
             self.component_crosses[surface.components[nodes[0] as usize] as usize] = true;
             for node in nodes {
-                if std::mem::replace(&mut self.sides[node as usize], Side::Border) == Side::Unknown
+                if std::mem::replace(&mut self.sides[node as usize], Location::Border)
+                    == Location::Unknown
                 {
                     self.border.push(node);
                 }
@@ -102,11 +103,11 @@ impl Inside {
 
     /// Gives `side` to all that triangles which do not cross connect with `start`; outside no further
     /// than from border to border.
-    fn spread(&mut self, body: &SceneBody, start: u32, side: Side) {
+    fn spread(&mut self, body: &SceneBody, start: u32, side: Location) {
         self.sides[start as usize] = side;
         self.pending.push(start);
         while let Some(node) = self.pending.pop() {
-            if side == Side::Inside {
+            if side == Location::Inside {
                 self.nodes.push(node);
             }
             for &triangle in body.surface.triangles_of_nodes.of(node) {
@@ -115,7 +116,8 @@ impl Inside {
                 }
                 for other in body.mesh.triangles()[triangle as usize] {
                     let former = &mut self.sides[other as usize];
-                    if *former == Side::Border || (*former == Side::Unknown && side == Side::Inside)
+                    if *former == Location::Border
+                        || (*former == Location::Unknown && side == Location::Inside)
                     {
                         *former = side;
                         self.pending.push(other);

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use palpate_geometry::Point;
 use palpate_model::{Mesh, MeshData};
+use palpate_testing::Random;
 
 use super::adjacency::{Adjacency, bits};
 use super::boxes::Block;
@@ -13,54 +14,37 @@ use super::{
 };
 use crate::simd::Isa;
 
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_mul(0x5851_f42d_4c95_7f2d).wrapping_add(0x1405_7b7e_f767_814f);
-        let mixed = self.0 ^ self.0 >> 29;
-        mixed.wrapping_mul(0xbf58_476d_1ce4_e5b9) >> 7
-    }
-
-    fn below(&mut self, end: usize) -> usize {
-        self.next() as usize % end
-    }
-
-    fn unit(&mut self) -> f64 {
-        (self.next() >> 4) as f64 / (1_u64 << 53) as f64 - 0.5
-    }
-
-    /// Numbers that round badly: neighbours of `f32` values and of the ends of its range.
-    fn awkward(&mut self) -> f64 {
-        const EDGES: [f64; 8] = [
-            0.0,
-            1.0,
-            f32::MAX as f64,
-            f32::MIN_POSITIVE as f64,
-            1e-45,
-            1e300,
-            f64::MIN_POSITIVE,
-            16_777_216.0,
-        ];
-        let value = match self.below(4) {
-            0 => EDGES[self.below(EDGES.len())],
-            1 => f64::from(self.unit() as f32),
-            2 => 10_f64.powi(self.below(80) as i32 - 40) * self.unit(),
-            _ => self.unit(),
-        };
-        let value = if self.below(2) == 0 { value } else { -value };
-        match self.below(3) {
-            0 => value.next_up(),
-            1 => value.next_down(),
-            _ => value,
-        }
+/// Numbers that round badly: neighbours of `f32` values and of the ends of its range.
+fn awkward(random: &mut Random) -> f64 {
+    const EDGES: [f64; 8] = [
+        0.0,
+        1.0,
+        f32::MAX as f64,
+        f32::MIN_POSITIVE as f64,
+        1e-45,
+        1e300,
+        f64::MIN_POSITIVE,
+        16_777_216.0,
+    ];
+    let value = match random.below(4) {
+        0 => EDGES[random.below(EDGES.len())],
+        1 => f64::from(random.between(-0.5, 0.5) as f32),
+        2 => 10_f64.powi(random.below(80) as i32 - 40) * random.between(-0.5, 0.5),
+        _ => random.between(-0.5, 0.5),
+    };
+    let value = if random.below(2) == 0 { value } else { -value };
+    match random.below(3) {
+        0 => value.next_up(),
+        1 => value.next_down(),
+        _ => value,
     }
 }
 
 /// A tangle of `count` triangles over few nodes.
 fn tangle(count: usize, random: &mut Random) -> Arc<Mesh> {
     let node_count = 3 + count;
-    let nodes = (0..node_count).map(|_| std::array::from_fn(|_| random.unit())).collect();
+    let nodes =
+        (0..node_count).map(|_| std::array::from_fn(|_| random.between(-0.5, 0.5))).collect();
     let mut triangles: Vec<[u32; 3]> = Vec::new();
     while triangles.len() < count {
         let first = random.below(node_count - 2);
@@ -83,12 +67,12 @@ fn bits_of(blocks: &[Block]) -> Vec<u32> {
 }
 
 fn positions(mesh: &Mesh, round: usize, random: &mut Random) -> Vec<Point> {
-    let awkward = |random: &mut Random| std::array::from_fn(|_| random.awkward());
+    let awkward_point = |random: &mut Random| std::array::from_fn(|_| awkward(random));
     match round % 3 {
         0 => mesh.nodes().to_vec(),
-        1 => mesh.nodes().iter().map(|_| awkward(random)).collect(),
+        1 => mesh.nodes().iter().map(|_| awkward_point(random)).collect(),
         _ => {
-            let offset: Point = std::array::from_fn(|_| 1e8 * random.unit());
+            let offset: Point = std::array::from_fn(|_| 1e8 * random.between(-0.5, 0.5));
             mesh.nodes().iter().map(|p| std::array::from_fn(|i| p[i] + offset[i])).collect()
         }
     }

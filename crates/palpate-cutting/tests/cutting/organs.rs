@@ -5,8 +5,9 @@ use std::path::Path;
 use palpate_cutting::{Blade, CutOptions, cut_on};
 use palpate_geometry::{Point, vec3};
 use palpate_model::{ReadOptions, read_mesh};
+use palpate_testing::Random;
 
-use crate::support::{Random, checked_cut};
+use crate::support::checked_cut;
 
 #[test]
 fn strokes_and_planes_through_a_kidney() {

@@ -3,9 +3,10 @@
 use palpate_cutting::{Blade, CutOptions, cut};
 use palpate_geometry::{Point, TriangleFeature, point_triangle, vec3};
 use palpate_model::Mesh;
+use palpate_testing::Random;
 use proptest::prelude::*;
 
-use crate::support::{Random, box_mesh, checked_cut};
+use crate::support::{box_mesh, checked_cut};
 
 fn point(low: f64, high: f64) -> impl Strategy<Value = Point> {
     proptest::array::uniform3(low..high)

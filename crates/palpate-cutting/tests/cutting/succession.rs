@@ -3,8 +3,9 @@
 use palpate_cutting::{Blade, CutOptions, CutReport, cut};
 use palpate_geometry::{Point, vec3};
 use palpate_model::Mesh;
+use palpate_testing::Random;
 
-use crate::support::{Random, box_mesh, checked_cut, checked_cut_on};
+use crate::support::{box_mesh, checked_cut, checked_cut_on};
 
 /// A plane, a square, a stroke or a loop somewhere in the box of `size`.
 fn random_blade(random: &mut Random, size: f64) -> Option<Blade> {

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use palpate_cutting::{Blade, Cut, CutOptions, cut, cut_on};
 use palpate_geometry::{Point, tetrahedron, vec3};
 use palpate_model::{Mesh, MeshData, NodeOrigin};
-use palpate_testing::{Fastest, box_of_cells};
+use palpate_testing::{Fastest, Random, box_of_cells};
 
 /// A box of `cells` unit cells of six tetrahedra, one corner at the origin, inner nodes moved by up
 /// to `jitter` of a cell; every tetrahedron is a region and has a fibre of its own.
@@ -30,18 +30,6 @@ pub(crate) fn box_mesh(cells: [usize; 3], jitter: f64, seed: u64) -> Mesh {
         ..MeshData::default()
     })
     .expect("a box")
-}
-
-/// Small, seeded, the same everywhere.
-pub(crate) struct Random(pub(crate) u64);
-
-impl Random {
-    pub(crate) fn between(&mut self, low: f64, high: f64) -> f64 {
-        self.0 =
-            self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        let high_bits = (self.0 >> 33) as f64 / f64::from(1_u32 << 31);
-        low + (high - low) * high_bits
-    }
 }
 
 /// Cuts, and checks everything that must hold whatever the blade. The parts of a blade are checked

@@ -10,7 +10,7 @@ use std::f64::consts::PI;
 
 use palpate_geometry::{Point, vec3};
 
-use super::{Inside, Side, reset};
+use super::{Inside, Location, reset};
 use crate::frame::SceneBody;
 
 impl Inside {
@@ -40,7 +40,7 @@ impl Inside {
         }
         // Components leave as a whole when all of them is inside.
         for &node in body.mesh.surface_nodes() {
-            if self.sides[node as usize] != Side::Inside {
+            if self.sides[node as usize] != Location::Inside {
                 self.component_crosses[body.surface.components[node as usize] as usize] = true;
             }
         }
@@ -60,13 +60,13 @@ impl Inside {
     fn locate_node(&mut self, node: u32, is_covered: &mut impl FnMut(u32) -> Option<bool>) {
         match is_covered(node) {
             Some(true) => self.found_inside(node),
-            Some(false) => self.sides[node as usize] = Side::Outside,
-            None => self.sides[node as usize] = Side::Border,
+            Some(false) => self.sides[node as usize] = Location::Outside,
+            None => self.sides[node as usize] = Location::Border,
         }
     }
 
     fn found_inside(&mut self, node: u32) {
-        self.sides[node as usize] = Side::Inside;
+        self.sides[node as usize] = Location::Inside;
         self.nodes.push(node);
     }
 
@@ -102,12 +102,12 @@ impl Inside {
     ) -> bool {
         for index in 0..self.part.len() {
             for node in body.mesh.triangles()[self.part[index] as usize] {
-                if self.sides[node as usize] == Side::Unknown {
+                if self.sides[node as usize] == Location::Unknown {
                     self.locate_node(node, is_covered);
                 }
                 match self.sides[node as usize] {
-                    Side::Inside => return true,
-                    Side::Outside if self.is_plain(body, node) => return false,
+                    Location::Inside => return true,
+                    Location::Outside if self.is_plain(body, node) => return false,
                     _ => {}
                 }
             }
@@ -129,10 +129,10 @@ impl Inside {
     fn locate_part(&mut self, body: &SceneBody, is_covered: &mut impl FnMut(u32) -> Option<bool>) {
         for index in 0..self.part.len() {
             for node in body.mesh.triangles()[self.part[index] as usize] {
-                if self.sides[node as usize] == Side::Unknown {
+                if self.sides[node as usize] == Location::Unknown {
                     self.locate_node(node, is_covered);
                 }
-                if self.sides[node as usize] == Side::Border {
+                if self.sides[node as usize] == Location::Border {
                     self.found_inside(node);
                 }
             }
