@@ -410,7 +410,9 @@ impl ElasticBody {
 
     /// Positions at the end of the step.
     pub(in crate::body) fn end_positions(&self, x: &[Point], positions: &mut [Point]) {
-        positions.copy_from_slice(x);
+        if !self.is_unattached() {
+            positions.copy_from_slice(x);
+        }
         for (node, d) in self.corrections() {
             positions[node] = (self.step.positions[node] + d).to_array();
         }
@@ -426,11 +428,15 @@ impl ElasticBody {
         next_x: &mut [Point],
         next_v: &mut [Point],
     ) {
-        next_v.fill([0.0; 3]);
-        self.end_positions(x, next_x);
+        if !self.is_unattached() {
+            next_x.copy_from_slice(x);
+            next_v.fill([0.0; 3]);
+        }
         for (node, d) in self.corrections() {
+            next_x[node] = (self.step.positions[node] + d).to_array();
             next_v[node] = (self.step.velocities[node] + d / self.time_step).to_array();
         }
+        self.place_driven(next_x);
         self.move_driven(next_v);
         if self.is_unattached() {
             let target = self.next_spin(x, forces, contact_forces);
