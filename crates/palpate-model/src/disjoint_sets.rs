@@ -27,7 +27,11 @@ impl DisjointSets {
     ///
     /// # Panics
     /// If there is no such number.
+    #[inline]
     pub fn join(&mut self, left: u32, right: u32) {
+        if self.0[left as usize] == self.0[right as usize] {
+            return;
+        }
         let (left, right) = (self.root(left), self.root(right));
         self.0[left.max(right) as usize] = left.min(right);
     }

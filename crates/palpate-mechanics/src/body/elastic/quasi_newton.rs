@@ -42,7 +42,7 @@ const SAME_SHAPE: f64 = 1e-3;
 const SAME_LARGE_SHAPE: f64 = 0.3;
 /// Part of that from which on an A that is made for another reason takes the present shape; what is made of a
 /// shape near it can be taken over otherwise.
-const SOON: f64 = 0.05;
+const SOON: f64 = 0.2;
 /// A move went too far when the residual along it has turned round and is more than this part of what it was;
 /// it is shortened so many times at most, and not below this part of it at a time.
 const OVERSHOT: f64 = 0.5;
