@@ -350,3 +350,53 @@ impl<P: Stored, const K: usize> pulp::WithSimd for Passes<'_, P, K> {
         self.factor.backward::<S, K>(simd, self.work);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use palpate_testing::Random;
+
+    use super::*;
+
+    struct Total<T>([T; LANES]);
+
+    impl<T: Real> pulp::WithSimd for Total<T> {
+        type Output = f64;
+
+        fn with_simd<S: Simd>(self, simd: S) -> f64 {
+            total(simd, &self.0).to_f64()
+        }
+    }
+
+    /// On every vector unit that there is.
+    fn totals<T: Real>(lanes: [T; LANES]) -> Vec<f64> {
+        let mut totals = vec![
+            pulp::WithSimd::with_simd(Total(lanes), pulp::Scalar::new()),
+            pulp::Arch::new().dispatch(Total(lanes)),
+        ];
+        #[cfg(target_arch = "x86_64")]
+        totals.extend(pulp::x86::V3::try_new().map(|simd| Simd::vectorize(simd, Total(lanes))));
+        totals
+    }
+
+    #[test]
+    fn totals_have_the_same_bits_on_every_vector_unit() {
+        let mut random = Random(5);
+        for _ in 0..1000 {
+            // Of very different sizes, so that another order would be another sum.
+            let lanes: [f64; LANES] =
+                std::array::from_fn(|lane| random.between(-1.0, 1.0) * 7f64.powi(lane as i32 % 5));
+            let halved = |mut sums: Vec<f64>, round: fn(f64) -> f64| {
+                while sums.len() > 1 {
+                    let (low, high) = sums.split_at(sums.len() / 2);
+                    sums = low.iter().zip(high).map(|(a, b)| round(a + b)).collect();
+                }
+                sums[0].to_bits()
+            };
+            let double = halved(lanes.to_vec(), |sum| sum);
+            assert!(totals(lanes).iter().all(|total| total.to_bits() == double));
+            let narrow = lanes.map(|lane| lane as f32);
+            let single = halved(narrow.map(f64::from).to_vec(), |sum| f64::from(sum as f32));
+            assert!(totals(narrow).iter().all(|total| total.to_bits() == single));
+        }
+    }
+}
