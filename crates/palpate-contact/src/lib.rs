@@ -31,6 +31,7 @@ mod error;
 mod frame;
 mod leaf_pairs;
 mod left_out;
+mod local_minimum;
 mod memory;
 mod method;
 mod nearest;
@@ -52,7 +53,7 @@ pub use bounding_tree::{BoundingTree, Split, TreeDefect, TreeNode, TreeStats};
 pub use error::SceneError;
 pub use memory::DetectionMemory;
 pub use method::Method;
-pub use options::{IntersectionOptions, ProximityOptions};
+pub use options::{IntersectionOptions, LOCAL_MINIMUM_SLACK, ProximityOptions};
 pub use pairs::{PairKind, PenetratingNode, ProximityPair, TrianglePair};
 pub use points::SurfacePoint;
 pub use results::{

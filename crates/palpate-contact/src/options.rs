@@ -20,20 +20,25 @@ impl Default for IntersectionOptions {
     }
 }
 
+/// How far a surface may lead towards what is close to it where [`ProximityOptions::local_minima`] still
+/// count, as the sine of the angle.
+pub const LOCAL_MINIMUM_SLACK: f64 = 0.06;
+
 /// Which close pairs count.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ProximityOptions {
     /// Also pairs that are closer than the distance in the positions of their meshes, at rest.
     pub close_at_rest: bool,
-    /// Each pair of closest features only once: edges only where both closest points lie between their
-    /// ends, since nodes and triangles tell the rest, and a node against an edge or node of a surface
-    /// only with the first of the triangles that share it. Contact is made of these; at a distance of a
-    /// few edges most pairs are others.
-    pub each_feature_once: bool,
+    /// Only where the distance between the surfaces has a local minimum, each pair of closest features once:
+    /// edges where both closest points lie between their ends, a node against an edge or node of a surface
+    /// with the first of the triangles that share it; and where the triangles around these features
+    /// do not lead closer, by more than [`LOCAL_MINIMUM_SLACK`]. Of a node, the surface around it does not
+    /// count. Contact is made of these; at a distance of a few edges nearly all pairs are others.
+    pub local_minima: bool,
 }
 
 impl Default for ProximityOptions {
     fn default() -> Self {
-        Self { close_at_rest: true, each_feature_once: false }
+        Self { close_at_rest: true, local_minima: false }
     }
 }

@@ -2,8 +2,9 @@
 
 use palpate_geometry::{Point, edge_edge, point_triangle, vec3};
 
-use crate::frame::{Frame, SceneBody};
+use crate::frame::Frame;
 use crate::left_out::ElementPair;
+use crate::local_minimum::{falls_away, falls_away_from_closest, is_first};
 use crate::options::ProximityOptions;
 use crate::pairs::{PairKind, ProximityPair};
 
@@ -38,7 +39,17 @@ pub(crate) fn vertex_triangle(
     if gap >= limit.distance {
         return None;
     }
-    if limit.options.each_feature_once && !is_first(b, triangle, found.weights) {
+    let local = limit.options.local_minima;
+    if local && !is_first(b, triangle, found.weights) {
+        return None;
+    }
+    let [wa, wb, wc] = found.weights;
+    let weights = [1.0, -wa, -wb, -wc];
+    let offset = combine(weights, [point, points[0], points[1], points[2]]);
+    let normal = direction(offset, gap, size(&points))
+        .or_else(|| unit(triangle_normal(&points)))
+        .unwrap_or_else(|| any_normal(vec3::sub(points[1], points[0])));
+    if local && gap > 0.0 && !falls_away_from_closest(b, triangle, found.weights, normal) {
         return None;
     }
     if frame.leaves_out([body_a, body_b], ElementPair::NodeAndTriangle([node, triangle])) {
@@ -51,39 +62,15 @@ pub(crate) fn vertex_triangle(
             return None;
         }
     }
-    let [wa, wb, wc] = found.weights;
-    let weights = [1.0, -wa, -wb, -wc];
-    let offset = combine(weights, [point, points[0], points[1], points[2]]);
     Some(ProximityPair {
         kind: PairKind::VertexTriangle,
         bodies: [body_a, body_b],
         elements: [node, triangle],
         nodes: [node, corners[0], corners[1], corners[2]],
         weights,
-        normal: direction(offset, gap, size(&points))
-            .or_else(|| unit(triangle_normal(&points)))
-            .unwrap_or_else(|| any_normal(vec3::sub(points[1], points[0]))),
+        normal,
         distance: gap,
     })
-}
-
-/// Whether a triangle is the first of those that share what of it is closest, by the weights of the
-/// closest point.
-fn is_first(body: &SceneBody, triangle: u32, weights: [f64; 3]) -> bool {
-    let mut on = (0..3).filter(|&corner| weights[corner] != 0.0);
-    match (on.next(), on.next(), on.next()) {
-        (Some(corner), None, _) => {
-            let node = body.mesh.triangles()[triangle as usize][corner];
-            body.surface.triangles_of_nodes.of(node)[0] == triangle
-        }
-        (Some(first), Some(second), None) => {
-            // Edge i joins corners i and i + 1.
-            let place = if second == first + 1 { first } else { second };
-            let edge = body.mesh.triangle_edges()[triangle as usize][place];
-            body.surface.edge_owners[edge as usize] == triangle
-        }
-        _ => true,
-    }
 }
 
 /// Two surface edges; `None` when they share a node or are otherwise not wanted.
@@ -105,18 +92,9 @@ pub(crate) fn edge_pair(
     let gap = found.distance_squared.sqrt();
     let (s, t) = (found.s, found.t);
     let weights = [1.0 - s, s, t - 1.0, -t];
-    if gap >= limit.distance || (limit.options.each_feature_once && weights.contains(&0.0)) {
+    let local = limit.options.local_minima;
+    if gap >= limit.distance || (local && weights.contains(&0.0)) {
         return None;
-    }
-    if frame.leaves_out([body_a, body_b], ElementPair::Edges([edge_a, edge_b])) {
-        return None;
-    }
-    if !limit.options.close_at_rest {
-        let at_rest_a = nodes_a.map(|node| a.mesh.nodes()[node as usize]);
-        let at_rest_b = nodes_b.map(|node| b.mesh.nodes()[node as usize]);
-        if edge_edge(&at_rest_a, &at_rest_b).distance_squared.sqrt() < limit.distance {
-            return None;
-        }
     }
     let points = [points_a[0], points_a[1], points_b[0], points_b[1]];
     let along_a = vec3::sub(points_a[1], points_a[0]);
@@ -130,15 +108,32 @@ pub(crate) fn edge_pair(
         Some(if outwards { normal } else { vec3::scale(normal, -1.0) })
     };
     let longest = vec3::norm(along_a).max(vec3::norm(along_b));
+    let normal = direction(combine(weights, points), gap, longest)
+        .or_else(crossing)
+        .unwrap_or_else(|| any_normal(along_a));
+    if local && gap > 0.0 {
+        let back = vec3::scale(normal, -1.0);
+        if !falls_away(a, nodes_a, back) || !falls_away(b, nodes_b, normal) {
+            return None;
+        }
+    }
+    if frame.leaves_out([body_a, body_b], ElementPair::Edges([edge_a, edge_b])) {
+        return None;
+    }
+    if !limit.options.close_at_rest {
+        let at_rest_a = nodes_a.map(|node| a.mesh.nodes()[node as usize]);
+        let at_rest_b = nodes_b.map(|node| b.mesh.nodes()[node as usize]);
+        if edge_edge(&at_rest_a, &at_rest_b).distance_squared.sqrt() < limit.distance {
+            return None;
+        }
+    }
     Some(ProximityPair {
         kind: PairKind::EdgeEdge,
         bodies: [body_a, body_b],
         elements: [edge_a, edge_b],
         nodes: [nodes_a[0], nodes_a[1], nodes_b[0], nodes_b[1]],
         weights,
-        normal: direction(combine(weights, points), gap, longest)
-            .or_else(crossing)
-            .unwrap_or_else(|| any_normal(along_a)),
+        normal,
         distance: gap,
     })
 }

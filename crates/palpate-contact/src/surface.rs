@@ -12,7 +12,7 @@ use palpate_model::{DisjointSets, Lists, Mesh};
 /// features is met in exactly one pair of triangles, and nothing depends on the tree.
 #[derive(Clone, Debug)]
 pub(crate) struct Surface {
-    /// Per triangle, in tree order: bit i set when it owns its node i, bit 3 + i its edge i (ab, bc, ca).
+    /// Per triangle, in tree order: see [`owned_features`].
     pub(crate) owned: Vec<u8>,
     /// Per surface edge, the triangle that owns it, as an index into the mesh's triangles.
     pub(crate) edge_owners: Vec<u32>,
@@ -29,23 +29,14 @@ pub(crate) struct Surface {
 
 impl Surface {
     pub(crate) fn new(mesh: &Mesh, triangle_order: &[u32]) -> Self {
-        let mut node_seen = vec![false; mesh.nodes().len()];
+        let owned_by_triangle = owned_features(mesh);
         let mut edge_owners = vec![NONE; mesh.surface_edges().len()];
-        let mut owned_by_triangle = Vec::with_capacity(triangle_order.len());
-        for (triangle, nodes) in mesh.triangles().iter().enumerate() {
-            let edges = mesh.triangle_edges()[triangle];
-            let mut bits = 0_u8;
-            for i in 0..3 {
-                if !std::mem::replace(&mut node_seen[nodes[i] as usize], true) {
-                    bits |= 1 << i;
-                }
-                let owner = &mut edge_owners[edges[i] as usize];
-                if *owner == NONE {
-                    *owner = triangle as u32;
-                    bits |= 8 << i;
+        for (triangle, edges) in mesh.triangle_edges().iter().enumerate() {
+            for (i, &edge) in edges.iter().enumerate() {
+                if owned_by_triangle[triangle] & 8 << i != 0 {
+                    edge_owners[edge as usize] = triangle as u32;
                 }
             }
-            owned_by_triangle.push(bits);
         }
         let owned = triangle_order.iter().map(|&t| owned_by_triangle[t as usize]).collect();
         let components = join_nodes(mesh);
@@ -65,6 +56,26 @@ impl Surface {
     pub(crate) fn tetrahedra_of_nodes(&self, mesh: &Mesh) -> &Lists<u32> {
         self.tetrahedra_of_nodes.get_or_init(|| mesh.node_tetrahedra())
     }
+}
+
+/// Per triangle: bit i set when it owns its node i, bit 3 + i its edge i (ab, bc, ca).
+pub(crate) fn owned_features(mesh: &Mesh) -> Vec<u8> {
+    let mut node_seen = vec![false; mesh.nodes().len()];
+    let mut edge_seen = vec![false; mesh.surface_edges().len()];
+    let mut is_first = |nodes: &[u32; 3], edges: &[u32; 3]| {
+        let mut bits = 0;
+        for i in 0..3 {
+            if !std::mem::replace(&mut node_seen[nodes[i] as usize], true) {
+                bits |= 1 << i;
+            }
+            if !std::mem::replace(&mut edge_seen[edges[i] as usize], true) {
+                bits |= 8 << i;
+            }
+        }
+        bits
+    };
+    let triangles = mesh.triangles().iter().zip(mesh.triangle_edges());
+    triangles.map(|(nodes, edges)| is_first(nodes, edges)).collect()
 }
 
 /// Labels each node with the smallest node that triangles connect it with.

@@ -14,6 +14,7 @@ mod features;
 mod hierarchy;
 mod nearest;
 mod order;
+mod regions;
 mod separation;
 #[cfg(test)]
 mod tests;
@@ -27,6 +28,7 @@ use palpate_model::mesh::NONE;
 
 use crate::memory::DetectionMemory;
 use crate::simd::Isa;
+use crate::surface::owned_features;
 use adjacency::{Adjacency, Incidence};
 pub(crate) use boxes::Block;
 pub(crate) use crossing::CrossTriangles;
@@ -53,6 +55,8 @@ pub(crate) struct WideBody {
     pub(crate) triangles: Hierarchy<3>,
     pub(crate) edges: Hierarchy<2>,
     pub(crate) points: Hierarchy<1>,
+    /// Per slot of `triangles`: which of its features it owns, see [`owned_features`].
+    owned: Vec<u8>,
     triangles_of_triangles: Adjacency,
     edges_of_edges: Adjacency,
     triangles_of_points: Adjacency,
@@ -79,6 +83,8 @@ impl WideBody {
         let positions: Vec<Point> = surface_nodes.iter().map(|&node| at(node)).collect();
         let (triangles, edges) =
             (Hierarchy::new(&triangles, &positions), Hierarchy::new(&edges, &positions));
+        let owned = owned_features(mesh);
+        let owned = triangles.slots().map(|triangle| owned[triangle as usize]).collect();
         let node_count = surface_nodes.len();
         let points = Hierarchy::in_order((0..node_count as u32).map(|node| [node]).collect());
         let of_triangles = (&triangles, &Incidence::new(&triangles, node_count));
@@ -94,6 +100,7 @@ impl WideBody {
             triangles,
             edges,
             points,
+            owned,
             features_refitted: false,
         }
     }
@@ -125,9 +132,10 @@ impl WideBody {
 
     /// Adds what this keeps in memory.
     pub(crate) fn add_memory(&self, sum: &mut DetectionMemory) {
-        let Self { surface_nodes, nodes, triangles, edges, points, .. } = self;
+        let Self { surface_nodes, nodes, triangles, edges, points, owned, .. } = self;
         sum.nodes += size_of_val(surface_nodes.as_slice()) + size_of_val(nodes.as_slice());
         sum.elements += triangles.slot_bytes() + edges.slot_bytes() + points.slot_bytes();
+        sum.elements += owned.len();
         sum.triangle_boxes += triangles.boxes.bytes();
         sum.feature_boxes += edges.boxes.bytes() + points.boxes.bytes();
         sum.triangle_masks += self.triangles_of_triangles.bytes();

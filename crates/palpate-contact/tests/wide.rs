@@ -8,7 +8,7 @@ use std::io::Write;
 use std::sync::Arc;
 use std::time::{SystemTime, UNIX_EPOCH};
 
-use palpate_contact::{IntersectionOptions, Method, Scene, SceneOptions};
+use palpate_contact::{IntersectionOptions, Method, ProximityOptions, Scene, SceneOptions};
 use palpate_model::{Mesh, MeshData};
 
 use scenes::{Point, Positions, Random, as_slices, deforming, horseshoe, jittered, soup};
@@ -77,7 +77,7 @@ fn very_many_small_scenes_have_the_pairs_of_the_double_loop() {
 
 fn compare_small_scenes(seed: u64, scenes: usize) {
     let mut random = Random(seed);
-    let (mut meeting, mut close) = (0, 0);
+    let (mut meeting, mut close, mut minima) = (0, 0, 0);
     for _ in 0..scenes / FRAMES {
         let first = 1 + below(&mut random, 15);
         let meshes = [patch(first, &mut random), patch(1 + below(&mut random, 15), &mut random)];
@@ -104,10 +104,16 @@ fn compare_small_scenes(seed: u64, scenes: usize) {
                 let found = &wide.proximity(&|_, _| Some(limit)).pairs;
                 assert_eq!(found, expected, "{limit}: {positions:?}");
                 close += expected.len();
+                let local = ProximityOptions { local_minima: true, ..Default::default() };
+                let expected = &slow.proximity_with(&|_, _| Some(limit), &local).pairs;
+                let found = &wide.proximity_with(&|_, _| Some(limit), &local).pairs;
+                assert_eq!(found, expected, "local minima, {limit}: {positions:?}");
+                minima += expected.len();
             }
         }
     }
     assert!(meeting > scenes && close > scenes, "{meeting} {close}");
+    assert!(minima > scenes / 10 && minima < close / 2, "{minima} of {close}");
 }
 
 #[test]

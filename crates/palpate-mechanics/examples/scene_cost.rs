@@ -57,11 +57,11 @@ fn main() -> Result<(), Box<dyn Error>> {
         let mut detect = start.elapsed();
         dynamics.begin_step();
         let start = Instant::now();
-        let once = ProximityOptions { each_feature_once: true, ..ProximityOptions::default() };
+        let local = ProximityOptions { local_minima: true, ..ProximityOptions::default() };
         let include = |a: usize, b: usize| a != b && dynamics.search_distance(a, b).is_some();
         let penetration = scene.penetration(&include).nodes.clone();
         let pairs =
-            scene.proximity_with(&|a, b| dynamics.search_distance(a, b), &once).pairs.clone();
+            scene.proximity_with(&|a, b| dynamics.search_distance(a, b), &local).pairs.clone();
         detect += start.elapsed();
         let stats = dynamics.finish_step(&pairs, &penetration)?;
         let t = stats.times;

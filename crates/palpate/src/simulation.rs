@@ -185,7 +185,7 @@ pub struct StepReport {
 
 /// What contacts are made of.
 pub(crate) const CONTACT_PAIRS: ProximityOptions =
-    ProximityOptions { close_at_rest: true, each_feature_once: true };
+    ProximityOptions { close_at_rest: true, local_minima: true };
 
 impl StepReport {
     /// The finest stages by name, in the order of the step; together nearly the whole of it.

@@ -489,11 +489,12 @@ impl Search<'_> {
             let bodies = search.bodies();
             let [a, b] = bodies.map(|body| &self.bodies[body as usize]);
             let reach = Reach::new(a, b, pair.margin);
+            let local = pair.limit.options.local_minima;
             let candidates = &candidates[start..group.end];
             start = group.end;
             kept.clear();
             if let Elements::Edges = search.elements {
-                self.isa.run(EdgePairs { a, b, reach, candidates, kept });
+                self.isa.run(EdgePairs { a, b, reach, local, candidates, kept });
                 for &[slot_a, slot_b] in kept.iter() {
                     let (edge_a, edge_b) = (a.edges.element(slot_a), b.edges.element(slot_b));
                     let swapped = pair.is_self() && edge_b < edge_a;
@@ -501,7 +502,7 @@ impl Search<'_> {
                     found.extend(edge_pair(self.frame, bodies, edges, pair.limit));
                 }
             } else {
-                self.isa.run(VertexPairs { from: a, to: b, reach, candidates, kept });
+                self.isa.run(VertexPairs { from: a, to: b, reach, local, candidates, kept });
                 for &[point, slot] in kept.iter() {
                     let elements = [a.mesh_node(point), b.triangles.element(slot)];
                     found.extend(vertex_triangle(self.frame, bodies, elements, pair.limit));

@@ -4,6 +4,7 @@
 //! (`Reach::separated`), so that nothing depends on how good the approximation is.
 
 use super::boxes::{corners, gather};
+use super::regions::{closest_beyond_ends, closest_features};
 use super::separation::{Reach, cross, dot, keep, sub};
 use super::{WIDTH, WideBody};
 use crate::simd::{Kernel, Lanes};
@@ -13,6 +14,8 @@ pub(crate) struct VertexPairs<'a> {
     pub(crate) from: &'a WideBody,
     pub(crate) to: &'a WideBody,
     pub(crate) reach: Reach,
+    /// Whether a pair is of no use whose closest feature certainly is that of an earlier triangle as well.
+    pub(crate) local: bool,
     /// Slot of the points of `from`, of the triangles of `to`.
     pub(crate) candidates: &'a [[u32; 2]],
     pub(crate) kept: &'a mut Vec<[u32; 2]>,
@@ -23,7 +26,7 @@ impl Kernel for VertexPairs<'_> {
 
     #[inline(always)]
     fn run<L: Lanes>(self) {
-        let Self { from, to, reach, candidates, kept } = self;
+        let Self { from, to, reach, local, candidates, kept } = self;
         for batch in candidates.chunks(WIDTH) {
             let lane = |i: usize| batch.get(i).unwrap_or(&batch[0]);
             let nodes = std::array::from_fn(|i| &from.nodes[lane(i)[0] as usize]);
@@ -33,7 +36,18 @@ impl Kernel for VertexPairs<'_> {
             let triangle = [sub(a, point), sub(b, point), sub(c, point)];
             let axis = towards_triangle(triangle);
             let apart = reach.separated(axis, [[L::splat(0.0); 3]], triangle);
-            keep(batch, apart, kept);
+            if local && apart.bits() != 0xff {
+                let closest = closest_features(reach, triangle);
+                for (i, &[point, slot]) in batch.iter().enumerate() {
+                    let certain = (0..6).map(|k| (closest[k] >> i & 1) << k).sum::<u32>();
+                    let owned = u32::from(to.owned[slot as usize]);
+                    if apart.bits() >> i & 1 == 0 && certain & !owned == 0 {
+                        kept.push([point, slot]);
+                    }
+                }
+            } else {
+                keep(batch, apart, kept);
+            }
         }
     }
 }
@@ -43,6 +57,8 @@ pub(crate) struct EdgePairs<'a> {
     pub(crate) a: &'a WideBody,
     pub(crate) b: &'a WideBody,
     pub(crate) reach: Reach,
+    /// Whether a pair is of no use whose closest points certainly do not lie between the ends.
+    pub(crate) local: bool,
     /// Slots of the edges of a and of b.
     pub(crate) candidates: &'a [[u32; 2]],
     pub(crate) kept: &'a mut Vec<[u32; 2]>,
@@ -53,7 +69,7 @@ impl Kernel for EdgePairs<'_> {
 
     #[inline(always)]
     fn run<L: Lanes>(self) {
-        let Self { a, b, reach, candidates, kept } = self;
+        let Self { a, b, reach, local, candidates, kept } = self;
         for batch in candidates.chunks(WIDTH) {
             let lane = |i: usize| batch.get(i).unwrap_or(&batch[0]);
             let edges_a = std::array::from_fn(|i| a.edges.corners[lane(i)[0] as usize]);
@@ -65,7 +81,10 @@ impl Kernel for EdgePairs<'_> {
                 sub(gather(&b.nodes, &edges_b, 1), start),
             ];
             let axis = between_edges(along_a, ends_b);
-            let apart = reach.separated(axis, [[L::splat(0.0); 3], along_a], ends_b);
+            let mut apart = reach.separated(axis, [[L::splat(0.0); 3], along_a], ends_b);
+            if local && apart.bits() != 0xff {
+                apart = apart.or(closest_beyond_ends(reach, along_a, ends_b));
+            }
             keep(batch, apart, kept);
         }
     }

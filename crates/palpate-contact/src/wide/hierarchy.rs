@@ -48,6 +48,11 @@ impl<const N: usize> Hierarchy<N> {
         self.elements.get(slot as usize).copied().unwrap_or(slot)
     }
 
+    /// The element in each slot but the pads.
+    pub(super) fn slots(&self) -> impl Iterator<Item = u32> {
+        (0..self.count as u32).map(|slot| self.element(slot))
+    }
+
     /// Which lanes of a block hold elements.
     pub(super) fn lanes(&self, block: usize) -> u8 {
         let count = self.count - block * WIDTH;

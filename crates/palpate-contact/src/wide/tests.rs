@@ -247,20 +247,21 @@ fn kernels_give_the_bits_of_plain_rust(fast: Isa) {
             let nodes: Vec<_> = (0..99).map(|_| candidate([a.nodes.len(), 37])).collect();
             let counts = [0, 1].map(|i| meshes[i].surface_edges().len());
             let edges: Vec<_> = (0..99).map(|_| candidate(counts)).collect();
-            let kept = |isa: Isa| {
+            let kept = |isa: Isa, local: bool| {
                 let (a, b) = (&a, &b);
                 let mut lists: [Vec<[u32; 2]>; 5] = Default::default();
                 let [kept, near_nodes, near_edges, crossing, open] = &mut lists;
                 isa.run(CrossTriangles { a, b, reach, candidates: &triangles, crossing, open });
                 isa.run(SeparateTriangles { a, b, reach, candidates: &triangles, kept });
                 let kept = near_nodes;
-                isa.run(VertexPairs { from: a, to: b, reach, candidates: &nodes, kept });
+                isa.run(VertexPairs { from: a, to: b, reach, local, candidates: &nodes, kept });
                 let kept = near_edges;
-                isa.run(EdgePairs { a, b, reach, candidates: &edges, kept });
+                isa.run(EdgePairs { a, b, reach, local, candidates: &edges, kept });
                 lists
             };
-            let lists = kept(fast);
-            assert_eq!(lists, kept(Isa::Scalar));
+            assert_eq!(kept(fast, true), kept(Isa::Scalar, true));
+            let lists = kept(fast, false);
+            assert_eq!(lists, kept(Isa::Scalar, false));
             if round % 3 == 0 {
                 let filtered = &lists[..3];
                 let some = |list: &Vec<_>| (margin < 1.0) == (list.len() < 99);

@@ -4,16 +4,17 @@
 use std::sync::Arc;
 
 use palpate_contact::{
-    IntersectionOptions, Method, PairKind, ProximityOptions, ProximityPair, Scene, SceneError,
-    SceneOptions, TrianglePair,
+    IntersectionOptions, LOCAL_MINIMUM_SLACK, Method, PairKind, ProximityOptions, ProximityPair,
+    Scene, SceneError, SceneOptions, TrianglePair,
 };
-use palpate_geometry::{edge_edge, point_triangle};
+use palpate_geometry::{edge_edge, point_triangle, vec3};
 use palpate_model::Mesh;
 use proptest::prelude::*;
 
 use crate::intersections::scene;
 use crate::scenes::{
-    Case, Random, as_slices, block, cases, deforming, horseshoe, jittered, rounded, sheet, soup,
+    Case, Positions, Random, as_slices, block, cases, deforming, horseshoe, jittered, rounded,
+    sheet, soup,
 };
 
 const SHARED: IntersectionOptions =
@@ -130,8 +131,32 @@ fn is_first(meshes: &[Arc<Mesh>], pair: &ProximityPair) -> bool {
     first == Some(pair.elements[1] as usize)
 }
 
-/// Compares all methods; returns how many pairs were found, and how many were left out.
-fn check(case: &Case, left_out: &LeftOut, distance: f64) -> [usize; 2] {
+/// Whether no triangle at the closest features leads from one surface towards the other.
+fn is_local_minimum(meshes: &[Arc<Mesh>], frame: &Positions, pair: &ProximityPair) -> bool {
+    let ends = if pair.kind == PairKind::EdgeEdge { 2 } else { 1 };
+    (0..4).all(|corner| {
+        let side = usize::from(corner >= ends);
+        let on = |k: &usize| usize::from(*k >= ends) == side && pair.weights[*k] != 0.0;
+        let feature: Vec<u32> = (0..4).filter(on).map(|k| pair.nodes[k]).collect();
+        let at = |node: u32| frame[pair.bodies[side] as usize][node as usize];
+        let triangles = meshes[pair.bodies[side] as usize].triangles().iter();
+        let around = triangles.filter(|corners| feature.iter().all(|n| corners.contains(n)));
+        let towards = if side == 0 { -1.0 } else { 1.0 };
+        // Around a node alone the other surface is not asked.
+        pair.distance == 0.0
+            || (ends == 1 && side == 0)
+            || around.flatten().filter(|node| !feature.contains(node)).all(|&node| {
+                let steps = feature.iter().map(|&from| vec3::sub(at(node), at(from)));
+                let longest = steps.clone().map(vec3::norm).fold(0.0, f64::max);
+                let closer = steps.map(|step| towards * vec3::dot(step, pair.normal));
+                closer.fold(0.0, f64::max) <= LOCAL_MINIMUM_SLACK * longest
+            })
+    })
+}
+
+/// Compares all methods; returns how many pairs were found, how many were left out, and how many
+/// would have been left out as no local minima.
+fn check(case: &Case, left_out: &LeftOut, distance: f64) -> [usize; 3] {
     let of =
         |method| scene(&case.meshes, SceneOptions { method, leaf_size: 3, ..Default::default() });
     let mut slow = of(Method::AllPairs);
@@ -140,7 +165,7 @@ fn check(case: &Case, left_out: &LeftOut, distance: f64) -> [usize; 2] {
         left_out.apply(scene);
     }
     let at_rest = ProximityOptions { close_at_rest: false, ..ProximityOptions::default() };
-    let (mut kept, mut thinned) = (0, 0);
+    let (mut kept, mut thinned, mut not_local) = (0, 0, 0);
     for frame in &case.frames {
         slow.update(&as_slices(frame)).expect("finite positions");
         let mut pairs = slow.intersections(&SHARED).pairs.clone();
@@ -150,8 +175,11 @@ fn check(case: &Case, left_out: &LeftOut, distance: f64) -> [usize; 2] {
         close.retain(|pair| left_out.keeps_features(&case.meshes, pair));
         let mut new = close.clone();
         new.retain(|pair| !close_at_rest(&case.meshes, pair, distance));
-        let mut first = new.clone();
-        first.retain(|pair| is_first(&case.meshes, pair));
+        let mut local = new.clone();
+        local.retain(|pair| is_first(&case.meshes, pair));
+        let first = local.len();
+        local.retain(|pair| is_local_minimum(&case.meshes, frame, pair));
+        not_local += first - local.len();
         kept += pairs.len() + close.len();
         thinned += close.len() - new.len();
         for scene in &mut scenes {
@@ -160,27 +188,29 @@ fn check(case: &Case, left_out: &LeftOut, distance: f64) -> [usize; 2] {
             assert_eq!(scene.intersections(&SHARED).pairs, pairs, "{name}");
             assert_eq!(scene.proximity(&|_, _| Some(distance)).pairs, close, "{name}");
             assert_eq!(scene.proximity_with(&|_, _| Some(distance), &at_rest).pairs, new, "{name}");
-            let once = ProximityOptions { each_feature_once: true, ..at_rest };
-            assert_eq!(scene.proximity_with(&|_, _| Some(distance), &once).pairs, first, "{name}");
+            let minima = ProximityOptions { local_minima: true, ..at_rest };
+            let found = &scene.proximity_with(&|_, _| Some(distance), &minima).pairs;
+            assert_eq!(*found, local, "{name}");
             let nodes = &scene.contact_nodes(&SHARED).nodes;
             assert_eq!(*nodes, contact_nodes(&case.meshes, &pairs), "{name}");
         }
     }
-    [kept, thinned - kept]
+    [kept, thinned - kept, not_local]
 }
 
 #[test]
 fn what_is_left_out_is_left_out_by_every_method() {
     let mut random = Random(31);
-    let mut counts = [0; 2];
+    let mut counts = [0; 3];
     for case in cases().iter().filter(|case| !["huge", "tiny", "far and tiny"].contains(&case.name))
     {
         for left_out in [LeftOut::default(), LeftOut::random(&case.meshes, &mut random)] {
-            let [kept, out] = check(case, &left_out, 0.2);
-            counts = [counts[0] + kept, counts[1] + out];
+            let found = check(case, &left_out, 0.2);
+            counts = [0, 1, 2].map(|k| counts[k] + found[k]);
         }
     }
-    assert!(counts.iter().all(|&count| count > 1000), "{counts:?}");
+    let [kept, out, not_local] = counts;
+    assert!(kept > 1000 && out > 1000 && not_local > 500, "{counts:?}");
 }
 
 #[test]

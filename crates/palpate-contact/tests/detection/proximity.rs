@@ -1,7 +1,7 @@
 //! Close pairs of every method against the double loop over nodes, triangles and edges, and each record
 //! against its own definition.
 
-use palpate_contact::{Method, PairKind, ProximityPair, Scene, SceneOptions};
+use palpate_contact::{Method, PairKind, ProximityOptions, ProximityPair, Scene, SceneOptions};
 use palpate_geometry::vec3;
 use proptest::prelude::*;
 
@@ -61,6 +61,8 @@ fn check_record(scene: &Scene, pair: &ProximityPair, limit: f64) {
     }
 }
 
+const LOCAL: ProximityOptions = ProximityOptions { close_at_rest: true, local_minima: true };
+
 fn check(case: &Case, distances: &[f64]) -> usize {
     let mut count = 0;
     let of = |method, leaf_size| {
@@ -85,11 +87,15 @@ fn check(case: &Case, distances: &[f64]) -> usize {
                 let limit = distance(a.min(b), a.max(b)).expect("the pair was asked for");
                 check_record(&slow, pair, limit);
             }
+            let local = slow.proximity_with(&distance, &LOCAL).pairs.clone();
+            assert!(local.iter().all(|pair| expected.contains(pair)));
             for scene in &mut fast {
                 scene.update(&as_slices(frame)).expect("finite positions");
                 let options = *scene.options();
                 let found = &scene.proximity(&distance).pairs;
                 assert_eq!(found, &expected, "{}: {options:?}, {cells} cells", case.name);
+                let found = &scene.proximity_with(&distance, &LOCAL).pairs;
+                assert_eq!(found, &local, "{}: {options:?}, {cells} cells", case.name);
             }
             count += expected.len();
         }

@@ -1,7 +1,8 @@
 //! From close pairs to contacts: which pairs carry a force, and with what law.
 //!
 //! Proximity is complete: a node near an edge is close to both triangles there and to some beyond.
-//! Kept are the local minima of the distance between the surfaces, each once.
+//! Kept are the local minima of the distance between the surfaces, each once; detection has left out
+//! most others (`ProximityOptions::local_minima`).
 
 mod closest;
 mod edge_edge;

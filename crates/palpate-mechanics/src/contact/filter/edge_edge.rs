@@ -1,7 +1,7 @@
 //! Edges against edges.
 
 use glam::DVec3;
-use palpate_contact::ProximityPair;
+use palpate_contact::{LOCAL_MINIMUM_SLACK, ProximityPair};
 
 use super::own::{REST_NEIGHBOUR, rest_distance};
 use super::{ANGLE_SLACK, BodyView, Meeting, leads_away};
@@ -14,6 +14,7 @@ const SHARP_EDGE: f64 = 0.25;
 const LOADED_SHARP_EDGE: f64 = 0.05;
 /// Slack in the tests of direction of such a pair.
 const LOADED_SLACK: f64 = 0.05;
+const _: () = assert!(LOADED_SLACK < LOCAL_MINIMUM_SLACK, "what detection leaves out is no contact");
 
 /// Gap and normal of an edge against an edge, if the pair is a contact.
 pub(super) fn edge_edge(
