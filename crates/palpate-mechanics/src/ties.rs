@@ -119,7 +119,7 @@ impl Ties {
     pub(crate) fn restore(&mut self, pulls: &[Pull]) {
         self.pulls.clear();
         self.pulls.extend_from_slice(pulls);
-        let used = pulls.iter().map(|pull| pull.id + 1).max().unwrap_or(0);
+        let used = pulls.iter().map(|pull| pull.id.saturating_add(1)).max().unwrap_or(0);
         self.next_id = self.next_id.max(used);
     }
 

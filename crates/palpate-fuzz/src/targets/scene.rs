@@ -321,7 +321,7 @@ impl Scenes {
         self.all("contact nodes", |scene| scene.contact_nodes(&options).nodes.clone())?;
         let near = ProximityOptions {
             close_at_rest: choices.below(4) > 0,
-            each_feature_once: choices.flag(),
+            local_minima: choices.flag(),
         };
         let distance = choices.number();
         let self_contact = choices.flag();

@@ -1,10 +1,12 @@
 //! Nodes that are moved along a path.
 
+use std::collections::HashSet;
+
 use glam::DVec3;
 use palpate_geometry::Point;
 
 use super::Dynamics;
-use crate::body::{BodyKind, MovingBody, first_not_finite};
+use crate::body::{BodyKind, first_not_finite};
 use crate::error::MechanicsError;
 
 /// Nodes of one body that go where they are told.
@@ -40,7 +42,7 @@ impl Drives {
     pub(super) fn restore(&mut self, drives: &[Drive]) {
         self.all.clear();
         self.all.extend_from_slice(drives);
-        let used = drives.iter().map(|drive| drive.id + 1).max().unwrap_or(0);
+        let used = drives.iter().map(|drive| drive.id.saturating_add(1)).max().unwrap_or(0);
         self.next_id = self.next_id.max(used);
     }
 
@@ -176,20 +178,25 @@ impl Dynamics {
 
     /// Checks the drives of a state.
     pub(super) fn check_drives(&self, drives: &[Drive]) -> Result<(), MechanicsError> {
+        let mut driven = HashSet::new();
         for drive in drives {
             let body = drive.body as usize;
+            self.check_body(body)?;
+            if drive.nodes.is_empty() {
+                return Err(MechanicsError::NoNodes);
+            }
             let (expected, found) = (drive.nodes.len(), drive.targets.len());
             if expected != found || expected != drive.forces.len() {
                 return Err(MechanicsError::WrongCount { body, expected, found });
             }
             for &node in &drive.nodes {
-                let free = |moving: &MovingBody| {
-                    moving.elastic().is_none_or(|elastic| elastic.is_free(node as usize))
-                };
-                let exists =
-                    body < self.body_count() && (node as usize) < self.body(body).positions.len();
-                if !exists || free(self.body(body)) {
-                    return Err(MechanicsError::NotFixed { body, node: node as usize });
+                let node = node as usize;
+                self.check_node(body, node)?;
+                if self.body(body).elastic().is_none_or(|elastic| elastic.is_free(node)) {
+                    return Err(MechanicsError::NotFixed { body, node });
+                }
+                if !driven.insert((body, node)) {
+                    return Err(MechanicsError::DrivenTwice { body, node });
                 }
             }
             if let Some(place) = first_not_finite(&drive.targets) {

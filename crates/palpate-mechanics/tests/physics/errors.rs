@@ -1,6 +1,6 @@
 //! What is refused, and how it is named.
 
-use palpate_mechanics::{Cause, ContactForce, Dynamics, DynamicsOptions, MechanicsError};
+use palpate_mechanics::{Cause, ContactForce, Drive, Dynamics, DynamicsOptions, MechanicsError};
 use palpate_model::Body;
 
 use crate::world::{GRAVITY, World, box_mesh, floor, model, soft};
@@ -98,6 +98,45 @@ fn bad_options_and_arrays_are_refused_and_change_nothing() {
     let found = world.dynamics.set_state(&other);
     assert_eq!(found, Err(MechanicsError::BadContact(0)));
     assert_eq!(world.dynamics.state(), before);
+}
+
+#[test]
+fn drives_of_a_state_are_of_fixed_nodes_that_exist() {
+    let mesh = box_mesh([1, 1, 1], [0.1; 3], |x| x);
+    let mut body = soft("organ", &mesh, 5e3, 0.01);
+    body.fixed_nodes = vec![0, 1, 2];
+    let mut world = World::new(&model(vec![body], 9.81), 1.0 / 60.0, 1);
+    world.dynamics.drive(0, &[0, 2], &[]).unwrap();
+    let before = world.dynamics.state();
+    let with = |change: &dyn Fn(&mut Drive)| {
+        let mut state = before.clone();
+        change(&mut state.drives[0]);
+        state
+    };
+    let twice = {
+        let mut state = before.clone();
+        state.drives.push(Drive { id: u64::MAX, ..state.drives[0].clone() });
+        state
+    };
+    let empty = |drive: &mut Drive| {
+        // Found by fuzzing: no node asked whether there is such a body.
+        *drive = Drive { body: 18, ..Drive::default() };
+    };
+    for (state, expected) in [
+        (with(&empty), MechanicsError::NoSuchBody { index: 18, count: 1 }),
+        (with(&|drive| *drive = Drive::default()), MechanicsError::NoNodes),
+        (
+            with(&|drive| drive.nodes[1] = 8),
+            MechanicsError::NoSuchNode { body: 0, node: 8, nodes: 8 },
+        ),
+        (with(&|drive| drive.nodes[1] = 3), MechanicsError::NotFixed { body: 0, node: 3 }),
+        (with(&|drive| drive.nodes[1] = 0), MechanicsError::DrivenTwice { body: 0, node: 0 }),
+        (twice, MechanicsError::DrivenTwice { body: 0, node: 0 }),
+    ] {
+        assert_eq!(world.dynamics.set_state(&state), Err(expected));
+        assert_eq!(world.dynamics.state(), before);
+    }
+    world.run(2);
 }
 
 #[test]

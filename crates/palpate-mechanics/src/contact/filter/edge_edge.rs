@@ -14,7 +14,8 @@ const SHARP_EDGE: f64 = 0.25;
 const LOADED_SHARP_EDGE: f64 = 0.05;
 /// Slack in the tests of direction of such a pair.
 const LOADED_SLACK: f64 = 0.05;
-const _: () = assert!(LOADED_SLACK < LOCAL_MINIMUM_SLACK, "what detection leaves out is no contact");
+const _: () =
+    assert!(LOADED_SLACK < LOCAL_MINIMUM_SLACK, "what detection leaves out is no contact");
 
 /// Gap and normal of an edge against an edge, if the pair is a contact.
 pub(super) fn edge_edge(
