@@ -31,7 +31,8 @@ const SETTLED: f64 = 0.1;
 /// The same while a cut changes the body, or a matrix that it brings is being made. The lips jump apart, and with a
 /// matrix that says too little of this shape passes go too far one after the other: the next steps do as well.
 const SETTLED_IN_CHANGE: f64 = 0.5;
-/// Iterations of a step, or solves for its contact forces, after which A is made anew.
+/// Iterations of a step, or solves for its contact forces, after which A is made anew; so it is after a move
+/// that went too far, where the factor is not large.
 const SLOW: u32 = 6;
 /// The same when a node has moved by more than this part of the body's radius since, apart from the
 /// body's motion as a whole: slow processes need few iterations in each of very many steps.
@@ -81,6 +82,8 @@ pub(super) struct QuasiNewton {
     /// any of them.
     passes: u32,
     effort: u32,
+    /// Whether a move of the last step went too far: A says too little about this shape.
+    overshot: bool,
     /// Longest move of the last iteration [m], and what was left of it where it went too far.
     longest: f64,
     left: f64,
@@ -129,6 +132,7 @@ impl QuasiNewton {
             iterations: 0,
             passes: 0,
             effort: 0,
+            overshot: false,
             longest: 0.0,
             left: 0.0,
         }
@@ -260,10 +264,13 @@ impl ElasticBody {
     pub(in crate::body) fn refresh_if_slow(&mut self, x: &[Point], is_coming: bool) -> bool {
         match std::mem::take(&mut self.elasticity) {
             Elasticity::Nonlinear(mut method) => {
-                let part = match method.effort {
-                    SLOW.. if !is_coming && self.has_large_factor() => SAME_LARGE_SHAPE,
-                    SLOW.. if !is_coming => SAME_SHAPE,
-                    _ => 1.0,
+                let large = self.has_large_factor();
+                // Shortening moves costs little beside a large factor.
+                let slow = method.effort >= SLOW || (method.overshot && !large);
+                let part = match (slow && !is_coming, large) {
+                    (true, true) => SAME_LARGE_SHAPE,
+                    (true, false) => SAME_SHAPE,
+                    (false, _) => 1.0,
                 };
                 let changed = self.change_of_shape(&method, x) > part * DEFORMED && {
                     method.x.clear();
@@ -339,7 +346,7 @@ impl ElasticBody {
         method.tissue.begin_step(x, self.time_step);
         self.begin_correction(method.mean_edge);
         (method.iterations, method.known) = (0, 0);
-        (method.effort, method.passes) = (0, 1);
+        (method.effort, method.passes, method.overshot) = (0, 1, false);
         self.step.expected.fill([0.0; 3]);
         let apart = self.step.turns;
         if let Some(contact) = contact.filter(|_| apart) {
@@ -412,8 +419,7 @@ impl ElasticBody {
             if after >= -OVERSHOT * before {
                 return;
             }
-            // A says too little about this shape.
-            method.effort = method.effort.max(SLOW);
+            method.overshot = true;
             // Where the residual along the move vanishes if it changes in proportion.
             let part = (before / (before - after)).max(SHORTEST);
             method.left *= part;
