@@ -319,10 +319,8 @@ impl Scenes {
         let pairs = |found: &Intersections| found.pairs.clone();
         self.all("intersections", |scene| pairs(scene.intersections(&options)))?;
         self.all("contact nodes", |scene| scene.contact_nodes(&options).nodes.clone())?;
-        let near = ProximityOptions {
-            close_at_rest: choices.below(4) > 0,
-            local_minima: choices.flag(),
-        };
+        let near =
+            ProximityOptions { close_at_rest: choices.below(4) > 0, local_minima: choices.flag() };
         let distance = choices.number();
         let self_contact = choices.flag();
         // Answers hold floats that may be NaN where coordinates are huge.
