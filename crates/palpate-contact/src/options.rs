@@ -20,8 +20,8 @@ impl Default for IntersectionOptions {
     }
 }
 
-/// How far a surface may lead towards what is close to it where [`ProximityOptions::local_minima`] still
-/// count, as the sine of the angle.
+/// How far a triangle may lead towards what is close to it where [`ProximityOptions::local_minima`] still
+/// count, as a part of how far the node that does is from the farther end of the closest feature.
 pub const LOCAL_MINIMUM_SLACK: f64 = 0.06;
 
 /// Which close pairs count.

@@ -9,6 +9,7 @@ use std::sync::Arc;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use palpate_contact::{IntersectionOptions, Method, ProximityOptions, Scene, SceneOptions};
+use palpate_geometry::vec3;
 use palpate_model::{Mesh, MeshData};
 
 use scenes::{Point, Positions, Random, as_slices, deforming, horseshoe, jittered, soup};
@@ -114,6 +115,86 @@ fn compare_small_scenes(seed: u64, scenes: usize) {
     }
     assert!(meeting > scenes && close > scenes, "{meeting} {close}");
     assert!(minima > scenes / 10 && minima < close / 2, "{minima} of {close}");
+}
+
+/// Triangles of one body and pairs of triangles of another, some as small beside the scene as `f32` can tell, close
+/// to each other where another feature begins to be the closest: one that the second of the pair owns.
+fn place_at_limits(count: usize, random: &mut Random) -> Positions {
+    let mut positions = vec![Vec::new(), Vec::new()];
+    let power = |least: f64, most: f64, random: &mut Random| {
+        10_f64.powf(least + (most - least) * random.vector(1.0)[0].abs())
+    };
+    let shape = |center: Point, size: f64, random: &mut Random| {
+        vec3::add_scaled(center, random.vector(1.0), size)
+    };
+    for _ in 0..count {
+        let size = power(-7.5, 0.0, random);
+        let a = random.vector(0.5);
+        let b = shape(a, size, random);
+        let t = random.vector(1.0)[0];
+        let c = shape(vec3::lerp(a, b, t), size * power(-6.0, 0.0, random), random);
+        let edge = vec3::sub(b, a);
+        let apart = shape([0.0; 3], size, random);
+        let above = |normal: Point| {
+            let height = size / vec3::norm(normal).max(f64::MIN_POSITIVE);
+            vec3::add_scaled(vec3::lerp(a, b, t), normal, height)
+        };
+        let (first, second) = match below(random, 3) {
+            // In the plane across the end of an edge of the second alone.
+            0 => {
+                let own = vec3::sub(c, a);
+                let part = vec3::dot(apart, own) / vec3::dot(own, own);
+                let across = vec3::add_scaled(apart, own, -part);
+                (vec3::add(a, across), shape(a, size, random))
+            }
+            // Above the edge of both.
+            1 => (above(vec3::cross(edge, vec3::sub(c, a))), shape(a, size, random)),
+            // The start of an edge that is closest there, nearly parallel or not.
+            _ => {
+                let other = vec3::add_scaled(edge, apart, power(-6.0, 0.0, random));
+                let start = above(vec3::cross(edge, other));
+                (start, vec3::add(start, other))
+            }
+        };
+        let first = shape(first, power(-9.0, -6.3, random), random);
+        positions[0].extend([first, second, shape(a, size, random)]);
+        positions[1].extend([a, b, c, shape(a, size, random)]);
+    }
+    // What all is relative to, in `f32`.
+    positions[0][0] = [-1.0; 3];
+    positions
+}
+
+#[test]
+fn local_minima_where_the_closest_feature_changes_are_those_of_the_double_loop() {
+    let mut random = Random(41);
+    let count = 12;
+    let mesh = |each: u32, corners: &[[u32; 3]]| {
+        let copies = (0..count as u32).flat_map(|i| corners.iter().map(move |c| (i, c)));
+        let triangles = copies.map(|(i, corners)| corners.map(|node| each * i + node)).collect();
+        let nodes = (0..each * count as u32).map(|i| [i, i % 2, i % 5].map(f64::from)).collect();
+        let data = MeshData { nodes, triangles, ..MeshData::default() };
+        Arc::new(Mesh::new(data).expect("different corners"))
+    };
+    let meshes = [mesh(3, &[[0, 1, 2]]), mesh(4, &[[0, 1, 3], [0, 1, 2]])];
+    let of = |method| {
+        let options = SceneOptions { method, ..SceneOptions::default() };
+        Scene::new(meshes.to_vec(), None, options).expect("two meshes")
+    };
+    let (mut wide, mut slow) = (of(Method::Wide), of(Method::AllPairs));
+    let local = ProximityOptions { local_minima: true, ..Default::default() };
+    let mut minima = 0;
+    for _ in 0..12_000 {
+        let positions = place_at_limits(count, &mut random);
+        wide.update(&as_slices(&positions)).expect("finite positions");
+        slow.update(&as_slices(&positions)).expect("finite positions");
+        let limit = 10_f64.powf(-7.0 * random.vector(1.0)[0].abs());
+        let distance = |a: usize, b: usize| (a != b).then_some(limit);
+        let expected = &slow.proximity_with(&distance, &local).pairs;
+        assert_eq!(&wide.proximity_with(&distance, &local).pairs, expected, "{positions:?}");
+        minima += expected.len();
+    }
+    assert!(minima > 100_000, "{minima}");
 }
 
 #[test]

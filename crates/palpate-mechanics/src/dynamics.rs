@@ -358,7 +358,7 @@ impl Dynamics {
     /// Solves for the contact forces and moves the bodies to the end of the step.
     ///
     /// `proximity` must hold every pair within [`Dynamics::search_distance`] at the current
-    /// positions, `penetration` every surface node inside another body.
+    /// positions, or those that are local minima at least (`ProximityOptions::local_minima`), `penetration` every surface node inside another body.
     ///
     /// # Errors
     /// If the state would not be finite, or tetrahedra blown up in a strict step; the state is then that

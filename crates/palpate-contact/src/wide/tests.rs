@@ -266,6 +266,9 @@ fn kernels_give_the_bits_of_plain_rust(fast: Isa) {
                 let filtered = &lists[..3];
                 let some = |list: &Vec<_>| (margin < 1.0) == (list.len() < 99);
                 assert!(filtered.iter().all(some), "{margin}");
+                let local = kept(fast, true);
+                let fewer = (1..3).all(|list| local[list].len() < lists[list].len());
+                assert!(fewer || margin < 0.1, "what is not closest is left out");
                 assert!(!lists[3].is_empty() && !lists[4].is_empty());
             }
         }

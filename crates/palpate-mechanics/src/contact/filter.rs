@@ -1,8 +1,8 @@
 //! From close pairs to contacts: which pairs carry a force, and with what law.
 //!
-//! Proximity is complete: a node near an edge is close to both triangles there and to some beyond.
-//! Kept are the local minima of the distance between the surfaces, each once; detection has left out
-//! most others (`ProximityOptions::local_minima`).
+//! Complete proximity has a node near an edge close to both triangles there and to some beyond.
+//! Kept are the local minima of the distance between the surfaces, each once; detection may have left
+//! out others (`ProximityOptions::local_minima`).
 
 mod closest;
 mod edge_edge;
@@ -10,7 +10,7 @@ mod own;
 mod vertex_triangle;
 
 use glam::DVec3;
-use palpate_contact::{PairKind, PenetratingNode, ProximityPair};
+use palpate_contact::{LOCAL_MINIMUM_SLACK, PairKind, PenetratingNode, ProximityPair};
 use palpate_geometry::Point;
 use rayon::prelude::*;
 
@@ -21,6 +21,7 @@ use vertex_triangle::vertex_triangle;
 
 /// Slack in the tests of direction: a flat surface must not lose its contacts to round-off.
 const ANGLE_SLACK: f64 = 1e-6;
+const _: () = assert!(ANGLE_SLACK < LOCAL_MINIMUM_SLACK, "what detection leaves out is no contact");
 /// Time in which the contact distance is recovered where surfaces overlap [s].
 const RECOVERY_TIME: f64 = 0.05;
 /// The same where they are only closer than it, as a pair may be that has just begun to count because its

@@ -159,7 +159,7 @@ impl Touch {
     /// Finds the contact forces now that the tool is elsewhere.
     ///
     /// `positions` are those of both bodies, the deformable one's as [`Touch::deform`] has left them,
-    /// `tool_before` the tool's in the last call, or in the step; `proximity` holds every pair within
+    /// `tool_before` the tool's in the last call, or in the step; `proximity` holds every pair, or local minimum, within
     /// [`Touch::search_distance`] at the present positions, `penetration` every surface node inside the other
     /// body.
     ///
