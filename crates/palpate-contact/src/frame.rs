@@ -11,6 +11,7 @@ use rayon::ThreadPool;
 use crate::bounding_tree::{BoundingTree, Split, corner_points};
 use crate::left_out::{ElementPair, LeftOut};
 use crate::surface::Surface;
+use crate::threads::Threads;
 use crate::upper_tree::UpperTree;
 use lazy_tree::LazyTree;
 
@@ -71,7 +72,21 @@ pub(crate) struct Frame<'a> {
     pub(crate) pool: Option<&'a ThreadPool>,
 }
 
-impl Frame<'_> {
+impl<'a> Frame<'a> {
+    pub(crate) fn new(
+        bodies: &'a [SceneBody],
+        upper: &'a UpperTree,
+        left_out: &'a LeftOut,
+        threads: &'a Threads,
+    ) -> Self {
+        Self { bodies, upper, left_out, all_elements: false, pool: threads.pool() }
+    }
+
+    /// Leaves out bodies, but no elements.
+    pub(crate) fn with_all_elements(self) -> Self {
+        Self { all_elements: true, ..self }
+    }
+
     /// Whether elements of two bodies may be left out.
     pub(crate) fn may_leave_out(&self, bodies: [u32; 2]) -> bool {
         !self.all_elements && self.left_out.concerns(bodies)

@@ -228,13 +228,7 @@ impl Scene {
     /// All pairs of surface triangles that meet (closed: touching counts), decided exactly. Triangles
     /// of one body that share a node are left out, unless `options` say otherwise.
     pub fn intersections(&mut self, options: &IntersectionOptions) -> &Intersections {
-        let frame = Frame {
-            bodies: &self.bodies,
-            upper: &self.upper,
-            left_out: &self.left_out,
-            all_elements: false,
-            pool: self.threads.pool(),
-        };
+        let frame = Frame::new(&self.bodies, &self.upper, &self.left_out, &self.threads);
         self.intersections.pairs.clear();
         self.intersections.stats = DetectionStats::default();
         self.detector.intersections(&frame, *options, &mut self.intersections);
@@ -266,13 +260,7 @@ impl Scene {
         distance: &(dyn Fn(usize, usize) -> Option<f64> + Sync),
         options: &ProximityOptions,
     ) -> &Proximity {
-        let frame = Frame {
-            bodies: &self.bodies,
-            upper: &self.upper,
-            left_out: &self.left_out,
-            all_elements: false,
-            pool: self.threads.pool(),
-        };
+        let frame = Frame::new(&self.bodies, &self.upper, &self.left_out, &self.threads);
         self.proximity.pairs.clear();
         self.proximity.stats = DetectionStats::default();
         let limit_of = |a: usize, b: usize| {
@@ -306,13 +294,8 @@ impl Scene {
     /// came out on the far side of a thin body is outside.
     pub fn penetration(&mut self, include: &(dyn Fn(usize, usize) -> bool + Sync)) -> &Penetration {
         // A node inside is inside, whatever its pairs.
-        let frame = Frame {
-            bodies: &self.bodies,
-            upper: &self.upper,
-            left_out: &self.left_out,
-            all_elements: true,
-            pool: self.threads.pool(),
-        };
+        let frame = Frame::new(&self.bodies, &self.upper, &self.left_out, &self.threads)
+            .with_all_elements();
         self.penetration.nodes.clear();
         self.penetration.stats = DetectionStats::default();
         let detector = &mut *self.detector;

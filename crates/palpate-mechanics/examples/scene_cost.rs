@@ -13,7 +13,7 @@ use std::time::Instant;
 use palpate_contact::{ProximityOptions, Scene, SceneOptions};
 use palpate_geometry::Point;
 use palpate_mechanics::{Dynamics, DynamicsOptions};
-use palpate_model::{CoreLoader, load_model};
+use palpate_model::{ReadOptions, load_model};
 
 /// The value that half of `values` stay below, the one that nine tenths do, and the largest.
 fn spread(values: impl Iterator<Item = f64>) -> [f64; 3] {
@@ -28,7 +28,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut number = |default: f64| arguments.next().map_or(Ok(default), |text| text.parse());
     let (steps, every, friction) = (number(240.0)? as usize, number(20.0)? as usize, number(-1.0)?);
     let (ahead, threads) = (number(0.0)?, number(1.0)? as usize);
-    let mut model = load_model(Path::new(&path), &CoreLoader)?;
+    let mut model = load_model(Path::new(&path), &ReadOptions::default())?;
     if friction >= 0.0 {
         for body in &mut model.bodies {
             body.contact.friction = friction;

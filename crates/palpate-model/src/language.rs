@@ -21,4 +21,4 @@ pub use document::{
     AppearanceEntries, AttachmentEntries, Block, Branch, ContactEntries, Document, Fixed,
     FixedRegion, PathKey, RegionEntries, Rotation, Settings, Transform, Tree, Unit,
 };
-pub use load::{CoreLoader, LoadError, MeshLoader, load_model};
+pub use load::{LoadError, MeshLoader, load_model};

@@ -18,9 +18,7 @@ pub use files::{
     FileError, FileErrorCause, MESH_EXTENSIONS, ReadMesh, ReadOptions, read_mesh, write_mesh,
     write_model,
 };
-pub use language::{
-    CoreLoader, Diagnostic, Document, LoadError, MeshLoader, ModelError, load_model,
-};
+pub use language::{Diagnostic, Document, LoadError, MeshLoader, ModelError, load_model};
 pub use lists::Lists;
 pub use mesh::{
     Defect, DefectKind, ElementKind, FIBRE_FAMILIES, Indices, Mesh, MeshChange, MeshData,

@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use palpate_model::{CoreLoader, Document, MeshLoader, load_model};
+use palpate_model::{Document, MeshLoader, ReadOptions, load_model};
 use tempfile::TempDir;
 
 /// Contents of the fenced blocks of one language in a page of docs/.
@@ -41,12 +41,12 @@ fn every_mesh_in_the_formats_page_is_one() {
     for (number, text) in meshes.iter().enumerate() {
         fs::write(folder.path().join(format!("mesh_{number}.seg")), text).unwrap();
     }
-    let mesh = |name| CoreLoader.load(&folder.path().join(name)).unwrap().mesh;
+    let mesh = |name| ReadOptions::default().load(&folder.path().join(name)).unwrap().mesh;
     assert_eq!(mesh("mesh_0.seg").tetrahedra().len(), 2);
     assert_eq!(mesh("mesh_0.seg").regions(), [1, 2]);
     assert_eq!(mesh("mesh_0.seg").node_sets()["base"], [0, 1, 2]);
     assert_eq!(mesh("mesh_1.seg").triangles(), [[0, 1, 2], [0, 2, 3]]);
     let model = folder.path().join("both.bml");
     fs::write(&model, "BRANCH{ TREE{ NE mesh_0.seg } TREE{ NE mesh_1.seg RG fixed } }").unwrap();
-    assert_eq!(load_model(&model, &CoreLoader).unwrap().bodies.len(), 2);
+    assert_eq!(load_model(&model, &ReadOptions::default()).unwrap().bodies.len(), 2);
 }

@@ -12,8 +12,8 @@ use glam::{DMat3, DQuat, DVec3};
 use grid::box_data;
 use insta::assert_snapshot;
 use palpate_model::{
-    Body, BodyError, CoreLoader, Document, Law, LoadError, Mesh, MeshData, MeshLoader, Model,
-    ReadMesh, ReadOptions, Structure, load_model, write_mesh, write_model,
+    Body, BodyError, Document, Law, LoadError, Mesh, MeshData, MeshLoader, Model, ReadMesh,
+    ReadOptions, Structure, load_model, write_mesh, write_model,
 };
 use tempfile::TempDir;
 
@@ -79,7 +79,7 @@ fn the_canonical_sample_loads() {
       }
     }";
     fs::write(&path, text).unwrap();
-    let model = load_model(&path, &CoreLoader).unwrap();
+    let model = load_model(&path, &ReadOptions::default()).unwrap();
     let names: Vec<&str> = model.bodies.iter().map(|body| body.name.as_str()).collect();
     assert_eq!(names, ["kidney", "aorta"]);
     assert_eq!(model.bodies[1].processor, Some(2));
@@ -225,7 +225,7 @@ fn core_loader_errors_are_shown_at_the_file_name() {
         "BRANCH{\n TREE{ NE kidny.seg }\n TREE{ NE bad.seg }\n TREE{ NE kidney.stl }\n}\n",
     )
     .unwrap();
-    let error = load_model(&folder.path().join("case.bml"), &CoreLoader).unwrap_err();
+    let error = load_model(&folder.path().join("case.bml"), &ReadOptions::default()).unwrap_err();
     assert_eq!((error.first().line, error.first().column), (2, 11));
     let text = error.to_string().replace(&format!("{}/", folder.path().display()), "");
     assert_snapshot!(text, @r"
@@ -251,10 +251,10 @@ fn core_loader_errors_are_shown_at_the_file_name() {
       |
       = help: kidney.stl: did you mean kidney.seg?
     ");
-    let error = load_model(Path::new("nowhere.bml"), &CoreLoader).unwrap_err();
+    let error = load_model(Path::new("nowhere.bml"), &ReadOptions::default()).unwrap_err();
     assert_snapshot!(error, @"error: nowhere.bml: No such file or directory (os error 2)");
     fs::write(folder.path().join("binary.bml"), [0xff, 0xfe]).unwrap();
-    let error = load_model(&folder.path().join("binary.bml"), &CoreLoader).unwrap_err();
+    let error = load_model(&folder.path().join("binary.bml"), &ReadOptions::default()).unwrap_err();
     assert!(error.to_string().contains("not UTF-8"), "{error}");
 }
 
@@ -426,7 +426,7 @@ fn a_model_of_many_bodies_is_written_so_that_it_can_be_read() {
     let folder = TempDir::new().unwrap();
     let path = folder.path().join("many.bml");
     write_model(&path, &model).unwrap();
-    let read = load_model(&path, &CoreLoader).unwrap();
+    let read = load_model(&path, &ReadOptions::default()).unwrap();
     let names = |model: &Model| -> Vec<String> {
         model.bodies.iter().map(|body| body.name.clone()).collect()
     };

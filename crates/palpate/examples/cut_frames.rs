@@ -10,11 +10,12 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use palpate::cutting::{Blade, CutOptions};
-use palpate::{ChangeReport, CoreLoader, Simulation, SimulationOptions, load_model};
+use palpate::{ChangeReport, ReadOptions, Simulation, SimulationOptions, load_model};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1);
-    let model = load_model(Path::new(&arguments.next().ok_or("give a model")?), &CoreLoader)?;
+    let model =
+        load_model(Path::new(&arguments.next().ok_or("give a model")?), &ReadOptions::default())?;
     let name = arguments.next().ok_or("give the name of a body")?;
     let mut number = |default: usize| arguments.next().map_or(Ok(default), |text| text.parse());
     let (frames, threads, settle) = (number(100)?, number(1)?, number(240)?);

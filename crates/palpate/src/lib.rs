@@ -4,9 +4,9 @@
 //! found every step by a bounding tree that is only refitted, and its bodies deform under them.
 //!
 //! ```no_run
-//! use palpate::{CoreLoader, Simulation, SimulationOptions, load_model};
+//! use palpate::{ReadOptions, Simulation, SimulationOptions, load_model};
 //!
-//! let model = load_model("models/case1.bml".as_ref(), &CoreLoader)?;
+//! let model = load_model("models/case1.bml".as_ref(), &ReadOptions::default())?;
 //! let mut simulation = Simulation::new(model, SimulationOptions::default())?;
 //! let report = simulation.step()?;
 //! println!("{} contacts at {} s", report.mechanics.contacts, simulation.time());
@@ -27,7 +27,7 @@ pub use palpate_model as model;
 
 pub use palpate_contact::{Scene, SceneError, SceneOptions};
 pub use palpate_cutting::{Blade, CutOptions};
-pub use palpate_model::{CoreLoader, Mesh, MeshData, Model, ModelError, load_model};
+pub use palpate_model::{Mesh, MeshData, Model, ModelError, ReadOptions, load_model};
 pub use scene_cuts::{SceneCutError, SceneCuts};
 pub use simulation::{
     BodyChange, ChangeReport, ChangeTimes, Simulation, SimulationError, SimulationOptions,

@@ -9,7 +9,7 @@ use palpate::geometry::{
     Aabb, Point, edge_edge, point_triangle, predicates, triangles_intersect, vec3,
 };
 use palpate::{
-    Blade, CoreLoader, CutOptions, Mesh, Scene, SceneCuts, SceneOptions, Simulation,
+    Blade, CutOptions, Mesh, ReadOptions, Scene, SceneCuts, SceneOptions, Simulation,
     SimulationOptions, load_model,
 };
 use palpate_testing::Random;
@@ -290,7 +290,7 @@ fn compare(scene: &mut Scene, thoroughly: bool, name: &str) -> [usize; 4] {
 #[test]
 fn after_a_hundred_cuts_of_case_2_the_pairs_are_those_of_the_double_loop() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models/case2.bml");
-    let model = load_model(&path, &CoreLoader).unwrap();
+    let model = load_model(&path, &ReadOptions::default()).unwrap();
     let soft: Vec<usize> = (0..5).filter(|&body| model.bodies[body].rigid.is_none()).collect();
     let mut simulation = Simulation::new(model, SimulationOptions::default()).unwrap();
     for _ in 0..90 {

@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use palpate::cutting::{Blade, CutOptions};
 use palpate::model::{Law, write_model};
-use palpate::{CoreLoader, Model, Simulation, SimulationError, SimulationOptions, load_model};
+use palpate::{Model, ReadOptions, Simulation, SimulationError, SimulationOptions, load_model};
 use stack::{bits, blade, model, run, start};
 
 fn cut(simulation: &mut Simulation, blade: &Blade) -> usize {
@@ -256,7 +256,7 @@ fn the_model_after_cuts_is_written_and_loaded_again() {
     let path = folder.path().join("after.bml");
     let files = write_model(&path, simulation.model()).unwrap();
     assert_eq!(files.len(), simulation.model().bodies.len() + 1);
-    let loaded = load_model(&path, &CoreLoader).unwrap();
+    let loaded = load_model(&path, &ReadOptions::default()).unwrap();
     assert_eq!(loaded.bodies.len(), simulation.model().bodies.len());
     for old in &simulation.model().bodies {
         // In the order of the structure.

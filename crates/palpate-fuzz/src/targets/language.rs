@@ -4,7 +4,7 @@ use std::path::Path;
 
 use palpate::model::language::{LoadError, MeshLoader};
 use palpate::model::{Document, ReadMesh, write_model};
-use palpate::{CoreLoader, Model, Simulation, SimulationOptions, load_model};
+use palpate::{Model, ReadOptions, Simulation, SimulationOptions, load_model};
 
 use super::shapes::{box_of, plate};
 use super::{Target, ensure};
@@ -138,7 +138,7 @@ impl Target for Language {
         let mut outcome = match &written {
             Ok(files) => {
                 let last = files.last().ok_or("no file was written")?;
-                match load_model(last, &CoreLoader) {
+                match load_model(last, &ReadOptions::default()) {
                     Ok(read) => ensure(read.bodies.len() == model.bodies.len(), || {
                         "a written model has other bodies".into()
                     })?,

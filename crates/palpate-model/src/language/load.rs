@@ -30,17 +30,7 @@ pub trait MeshLoader {
     fn load(&self, path: &Path) -> Result<ReadMesh, LoadError>;
 }
 
-/// Reads the formats that this crate knows, `.seg` and `.vtk`, and repairs nothing.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct CoreLoader;
-
-impl MeshLoader for CoreLoader {
-    fn load(&self, path: &Path) -> Result<ReadMesh, LoadError> {
-        ReadOptions::default().load(path)
-    }
-}
-
-/// As [`CoreLoader`], with these options.
+/// Reads the formats that this crate knows, `.seg` and `.vtk`.
 impl MeshLoader for ReadOptions {
     fn load(&self, path: &Path) -> Result<ReadMesh, LoadError> {
         Ok(read_mesh(path, self)?)
